@@ -1,0 +1,13 @@
+"""Control laws, one file a paper; each `design` returns the law and its guarantees together."""
+
+from collections.abc import Callable
+
+from controllers import efremov
+from spacecraft_sim.controller import Controller
+from spacecraft_sim.guarantee import Guarantee
+
+Design = Callable[..., tuple[Controller, tuple[Guarantee, ...]]]  # (model, thrusters, **parameters)
+
+REGISTRY: dict[str, Design] = {
+    "efremov_nonlocal": efremov.design_nonlocal,
+}

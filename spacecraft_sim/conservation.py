@@ -1,0 +1,40 @@
+"""Laws of mechanics as guarantees: they hold for every controller and judge the simulation."""
+
+import numpy as np
+
+from spacecraft_sim.guarantee import Guarantee, Measurement
+from spacecraft_sim.reduced import ReducedModel
+from spacecraft_sim.trajectory import Trajectory
+
+_SHARE = 1e-9  # of the largest momentum: far above rounding, far below any torque that is missed
+
+
+def momentum_balances(model: ReducedModel) -> tuple[Guarantee, ...]:
+    """Returns the balance of angular momentum H(t) - H(0) = impulse of all torques, by axis.
+
+    Args:
+        model: The plant, for the torque of each input.
+    """
+    axes = [axis for axis in "xyz" if f"angular_momentum_{axis}" in model.outputs]
+    return tuple(_balance(model, axis) for axis in axes if axis == "z" or len(axes) == 1)
+
+
+def _balance(model: ReducedModel, axis: str) -> Guarantee:
+    name = f"angular_momentum_{axis}"
+    torque = {channel: model.gain(channel, name) for channel in model.inputs}
+
+    def measure(trajectory: Trajectory) -> Measurement:
+        H = trajectory[name]
+        impulse = sum(k * trajectory[f"{channel}_impulse"] for channel, k in torque.items())
+        error = np.abs(H - H[0] - impulse)
+        worst = int(np.argmax(error))
+        bound = _SHARE * float(np.max(np.abs(H)))
+        return Measurement(float(error[worst]), float(trajectory.time[worst]), bound=bound)
+
+    return Guarantee(
+        claim=f"angular momentum about {axis} is the impulse given",
+        source="Efremov et al. 2006, (1.6): H' = u + f",
+        unit="N m s",
+        measure=measure,
+        predicted=0.0,
+    )

@@ -1,0 +1,52 @@
+"""What a controller is: frozen parameters with a pure `init` and `step`, no base class."""
+
+from collections.abc import Sequence
+from typing import Any, Protocol, runtime_checkable
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """A control law that flies on any plant which has the sensors it names.
+
+    Attributes:
+        sensors: Names of the readings that make up y, in order.
+        thrusters: Names of the channels that make up u, in order.
+        period: Sampling period, s; None for a relay law in continuous time, whose `events` are then
+            located exactly.
+    """
+
+    @property
+    def sensors(self) -> tuple[str, ...]: ...
+
+    @property
+    def thrusters(self) -> tuple[str, ...]: ...
+
+    @property
+    def period(self) -> float | None: ...
+
+    def init(self) -> Any:
+        """Returns the memory before the first step."""
+        ...
+
+    def step(self, t: float, y: Sequence[float], memory: Any) -> tuple[Sequence[float], Any]:
+        """Returns the command u, N or N m, and the new memory.
+
+        Args:
+            t: Time, s.
+            y: Readings, in the order of `sensors`.
+            memory: What `init` or the last step returned.
+        """
+        ...
+
+    def events(self, t: float, y: Sequence[float], memory: Any) -> Sequence[float]:
+        """Returns functions that are positive while the command of `memory` stands.
+
+        The command changes where one of them falls to zero; `step` is called there.  A sampled law
+        returns none.
+
+        Args:
+            t: Time, s.
+            y: Readings, in the order of `sensors`.
+            memory: What the last step returned.
+        """
+        ...

@@ -1,0 +1,59 @@
+"""Disturbance torques on the bus, as known functions of time."""
+
+import math
+from collections.abc import Mapping
+
+from spacecraft_sim.config import Model, quantity
+
+_GAUSS = math.sqrt(3) / 6  # the Gauss nodes of [0, 1] are 1/2 -+ this
+
+
+class Torque(Model):
+    """A torque about one bus axis: constant + amplitude sin(frequency t + phase)."""
+
+    constant: float = quantity("constant part", "N m", 0.0)
+    amplitude: float = quantity("amplitude of the periodic part", "N m", 0.0)
+    frequency: float = quantity("angular frequency of the periodic part", "rad/s", 0.0)
+    phase: float = quantity("phase of the periodic part", "rad", 0.0)
+
+    def __call__(self, t: float) -> float:
+        return self.constant + self.amplitude * math.sin(self.frequency * t + self.phase)
+
+
+class Disturbance:
+    """The disturbance torques of a scenario, by axis.
+
+    Attributes:
+        names: Input names `disturbance_<axis>`, in order.
+    """
+
+    def __init__(self, torques: Mapping[str, Torque]):
+        self.names = tuple(f"disturbance_{axis}" for axis in torques)
+        self._torques = tuple(torques.values())
+
+    def value(self, t: float) -> list[float]:
+        """Returns the torques at `t`, N m.
+
+        Args:
+            t: Time, s.
+        """
+        return [torque(t) for torque in self._torques]
+
+    def line(self, t0: float, t1: float) -> tuple[list[float], list[float]]:
+        """Returns value at `t0` and rate of the straight line that stands for the torque.
+
+        The line passes through the torque at the two Gauss nodes and so has the same mean and first
+        moment up to (t1 - t0)^5: an integrator of order 4 keeps its order.
+
+        Args:
+            t0: Start of the interval, s.
+            t1: End of the interval, s.
+        """
+        span = t1 - t0
+        value, rate = [], []
+        for torque in self._torques:
+            a, b = torque(t0 + (0.5 - _GAUSS) * span), torque(t0 + (0.5 + _GAUSS) * span)
+            slope = (b - a) / (2 * _GAUSS * span)
+            value.append((a + b - slope * span) / 2)
+            rate.append(slope)
+        return value, rate

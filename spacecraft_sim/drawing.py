@@ -1,0 +1,157 @@
+"""What a compiled spacecraft looks like: its shapes, its jets, and where its bodies are in time."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from spacecraft_sim import mjcf
+from spacecraft_sim.spacecraft import Spacecraft
+from spacecraft_sim.trajectory import Trajectory
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """A solid fixed to a body.
+
+    Attributes:
+        body: Name of the body.
+        kind: `box`, `capsule`, `cylinder`, `sphere` or `ellipsoid`.
+        size: Half-lengths of a box or ellipsoid; radius and half-length along z of the others, m.
+        position: Centre in the body frame, shape (3,), m.
+        quaternion: Orientation in the body frame, (w, x, y, z).
+        rgba: Colour, each from 0 to 1.
+    """
+
+    body: str
+    kind: str
+    size: Array
+    position: Array
+    quaternion: Array
+    rgba: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Jet:
+    """A place on a body where a thruster channel acts.
+
+    Attributes:
+        channel: Name of the thruster channel.
+        body: Name of the body.
+        position: Where, in the body frame, shape (3,), m.
+        force: Force on the body at unit thrust, body frame, shape (3,).
+        torque: Pure torque on the body at unit thrust, body frame, shape (3,), m.
+    """
+
+    channel: str
+    body: str
+    position: Array
+    force: Array
+    torque: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawing:
+    """The shapes of a machine and the motion of its bodies.
+
+    Attributes:
+        shapes: Solids.
+        jets: Places where thrusters act.
+        time: Instants, shape (n,), s.
+        positions: Body origins in the world by body name, each of shape (n, 3), m.
+        quaternions: Body orientations (w, x, y, z) by body name, each of shape (n, 4).
+        booms: Bodies of each boom from root to tip, by boom name.
+        tips: Position of each boom's tip in its last body, by boom name, m.
+    """
+
+    shapes: tuple[Shape, ...]
+    jets: tuple[Jet, ...]
+    time: Array
+    positions: dict[str, Array]
+    quaternions: dict[str, Array]
+    booms: dict[str, tuple[str, ...]]
+    tips: dict[str, Array]
+
+
+def draw(
+    model: mujoco.MjModel, spacecraft: Spacecraft, trajectory: Trajectory, *, frames: int = 2000
+) -> Drawing:
+    """Draws a flight from its recorded coordinates.
+
+    Args:
+        model: The compiled spacecraft.
+        spacecraft: The machine.
+        trajectory: A flight of the MuJoCo plant.
+        frames: How many instants at most; the rows are thinned evenly.
+
+    Returns:
+        Shapes and motion.
+    """
+    rows = np.unique(np.linspace(0, len(trajectory.time) - 1, frames).astype(int))
+    names = list(trajectory.signals)[-model.nq :]
+    coordinates = np.column_stack([trajectory[name][rows] for name in names])
+    bodies = [model.body(b).name for b in range(1, model.nbody)]
+    data = mujoco.MjData(model)
+    positions, quaternions = np.zeros((2, len(rows), len(bodies), 4))
+    for k, qpos in enumerate(coordinates):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        positions[k, :, :3], quaternions[k] = data.xpos[1:], data.xquat[1:]
+    return Drawing(
+        shapes=_shapes(model),
+        jets=_jets(model, spacecraft),
+        time=trajectory.time[rows],
+        positions={name: positions[:, b, :3] for b, name in enumerate(bodies)},
+        quaternions={name: quaternions[:, b] for b, name in enumerate(bodies)},
+        booms={b.name: (f"{b.name}_0", *mjcf.hinge_names(b)) for b in spacecraft.booms},
+        tips={b.name: model.site(f"{b.name}_tip").pos.copy() for b in spacecraft.booms},
+    )
+
+
+_KINDS = {
+    mujoco.mjtGeom.mjGEOM_BOX: "box",
+    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
+    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
+    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
+}
+
+
+def _shapes(model: mujoco.MjModel) -> tuple[Shape, ...]:
+    return tuple(
+        Shape(
+            body=model.body(int(model.geom_bodyid[g])).name,
+            kind=_KINDS[model.geom_type[g]],
+            size=model.geom_size[g].copy(),
+            position=model.geom_pos[g].copy(),
+            quaternion=model.geom_quat[g].copy(),
+            rgba=model.geom_rgba[g].copy(),
+        )
+        for g in range(model.ngeom)
+        if model.geom_type[g] in _KINDS and model.geom_bodyid[g]
+    )
+
+
+def _jets(model: mujoco.MjModel, spacecraft: Spacecraft) -> tuple[Jet, ...]:
+    jets = []
+    for thruster in spacecraft.thrusters:
+        for name in mjcf.motors(thruster):
+            actuator = model.actuator(name)
+            if actuator.trntype[0] != mujoco.mjtTrn.mjTRN_SITE:
+                continue  # a joint motor acts nowhere in particular
+            site = int(actuator.trnid[0])
+            rotation = np.zeros(9)
+            mujoco.mju_quat2Mat(rotation, model.site_quat[site])
+            gear = rotation.reshape(3, 3) @ actuator.gear.reshape(2, 3).T
+            jets.append(
+                Jet(
+                    channel=thruster.name,
+                    body=model.body(int(model.site_bodyid[site])).name,
+                    position=model.site_pos[site].copy(),
+                    force=gear[:, 0],
+                    torque=gear[:, 1],
+                )
+            )
+    return tuple(jets)

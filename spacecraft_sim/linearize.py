@@ -1,0 +1,186 @@
+"""Compiled MJCF -> linear model by name: M q'' + D q' + K q = B u, y = y0 + C [q; q'].
+
+q are the tangent coordinates at the reference configuration.  What is not linear there is refused.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from spacecraft_sim import mjcf
+from spacecraft_sim.readings import Readings, undeformed_mass_matrix
+from spacecraft_sim.scenario import Initial
+from spacecraft_sim.spacecraft import Spacecraft
+
+Array = np.ndarray
+
+_STEP = 1e-6  # of the central differences of the readings, rad or m, and per s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Linearization:
+    """The motion near the reference configuration.
+
+    Attributes:
+        M: Mass matrix, shape (nv, nv).
+        D: Damping matrix, shape (nv, nv).
+        K: Stiffness matrix, shape (nv, nv).
+        B: Generalised force of each actuator at unit control, shape (nv, nu).
+        C: Readings over positions and velocities, shape (ny, 2 nv).
+        y0: Readings at rest in the reference configuration, shape (ny,).
+        outputs: Reading names with their units.
+        actuators: Actuator names.
+        rigid: Indices of the degrees of freedom of the bus's own joint.
+    """
+
+    M: Array
+    D: Array
+    K: Array
+    B: Array
+    C: Array
+    y0: Array
+    outputs: dict[str, str]
+    actuators: tuple[str, ...]
+    rigid: tuple[int, ...]
+
+    def eigenvalues(self) -> Array:
+        """Returns the eigenvalues of the first-order form, shape (2 nv,), 1/s."""
+        n = len(self.M)
+        stiffness, damping = np.linalg.solve(self.M, self.K), np.linalg.solve(self.M, self.D)
+        return np.linalg.eigvals(
+            np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
+        )
+
+
+def linearize(model: mujoco.MjModel) -> Linearization:
+    """Reads the linear model off a compiled model.
+
+    Args:
+        model: The model.
+
+    Raises:
+        ValueError: If something in it is not linear at the reference configuration: constraints,
+            friction, springs that are not linear or not at rest, actuators with a bias.
+    """
+    _refuse_nonlinear(model)
+    outputs, y0, C = _linear_readings(model)
+    return Linearization(
+        M=undeformed_mass_matrix(model),
+        D=np.diag(_linear_coefficients(model.dof_damping)),
+        K=np.diag(_dof_stiffness(model)),
+        B=_actuator_forces(model),
+        C=C,
+        y0=y0,
+        outputs=outputs,
+        actuators=tuple(model.actuator(i).name for i in range(model.nu)),
+        rigid=_rigid_dofs(model),
+    )
+
+
+def initial_state(
+    model: mujoco.MjModel, spacecraft: Spacecraft, initial: Initial
+) -> tuple[Array, Array]:
+    """Returns the tangent coordinates and velocities of an initial state, each of shape (nv,).
+
+    Args:
+        model: The compiled spacecraft.
+        spacecraft: The machine, for the hinge rules of its booms.
+        initial: Attitude, rate and boom deflection.
+
+    Raises:
+        ValueError: If the bus cannot turn the way that is asked for.
+    """
+    tangent, rate = np.zeros(model.nv), np.zeros(model.nv)
+    bus = model.body(mjcf.BUS)
+    joint = model.joint(int(bus.jntadr[0]))
+    dof = int(joint.dofadr[0])
+    if joint.type[0] == mujoco.mjtJoint.mjJNT_FREE:
+        tangent[dof + 3 : dof + 6], rate[dof + 3 : dof + 6] = initial.attitude, initial.rate
+    else:
+        axis = joint.axis
+        for name, vector in (("attitude", initial.attitude), ("rate", initial.rate)):
+            across = np.array(vector) - np.dot(vector, axis) * axis
+            if np.any(across != 0):
+                raise ValueError(f"initial.{name} = {vector}: the bus turns about {axis} alone")
+        tangent[dof], rate[dof] = np.dot(initial.attitude, axis), np.dot(initial.rate, axis)
+    for boom in spacecraft.booms:
+        for name, angle in mjcf.bent(boom, initial.boom_mode, initial.boom_amplitude).items():
+            tangent[model.joint(name).dofadr[0]] = angle
+    return tangent, rate
+
+
+def _refuse_nonlinear(model: mujoco.MjModel) -> None:
+    faults = []
+    if model.neq:
+        faults.append("equality constraints")
+    if np.any(model.jnt_limited) or model.ntendon:
+        faults.append("joint limits or tendons")
+    if np.any(model.dof_frictionloss):
+        faults.append("dry friction")
+    if np.any(model.jnt_stiffness.reshape(model.njnt, -1)[:, 1:]):
+        faults.append("polynomial joint stiffness")
+    if np.any(model.dof_damping.reshape(model.nv, -1)[:, 1:]):
+        faults.append("polynomial joint damping")
+    if np.any(model.qpos_spring != model.qpos0):
+        faults.append("springs that pull at the reference configuration (springref)")
+    if np.any(model.actuator_biastype != mujoco.mjtBias.mjBIAS_NONE):
+        faults.append("actuators with a bias (position or velocity servos)")
+    if np.any(model.opt.gravity):
+        faults.append("gravity")
+    if faults:
+        raise ValueError(f"the model is not linear at its reference: it has {'; '.join(faults)}")
+
+
+def _linear_coefficients(coefficients: Array) -> Array:
+    """The linear term of coefficients that may be stored as polynomials, shape (n,)."""
+    return np.asarray(coefficients).reshape(len(coefficients), -1)[:, 0]
+
+
+def _dof_stiffness(model: mujoco.MjModel) -> Array:
+    stiffness = _linear_coefficients(model.jnt_stiffness)
+    per_dof = np.zeros(model.nv)
+    width = {mujoco.mjtJoint.mjJNT_FREE: 6, mujoco.mjtJoint.mjJNT_BALL: 3}
+    for j in range(model.njnt):
+        start = model.jnt_dofadr[j]
+        per_dof[start : start + width.get(model.jnt_type[j], 1)] = stiffness[j]
+    return per_dof
+
+
+def _rigid_dofs(model: mujoco.MjModel) -> tuple[int, ...]:
+    bus = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, mjcf.BUS)
+    if bus < 0:
+        return ()
+    start = int(model.body_dofadr[bus])
+    return tuple(range(start, start + int(model.body_dofnum[bus])))
+
+
+def _actuator_forces(model: mujoco.MjModel) -> Array:
+    data, B = mujoco.MjData(model), np.zeros((model.nv, model.nu))
+    for i in range(model.nu):
+        mujoco.mj_resetData(model, data)
+        if model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_NONE:
+            data.ctrl[i] = 1.0
+        else:
+            data.act[model.actuator_actadr[i]] = 1.0
+        mujoco.mj_forward(model, data)
+        B[:, i] = data.qfrc_actuator
+    return B
+
+
+def _linear_readings(model: mujoco.MjModel) -> tuple[dict[str, str], Array, Array]:
+    data = mujoco.MjData(model)
+    readings = Readings(model, data)
+    read = readings.select(tuple(readings.units))
+
+    def at(dq: Array, dv: Array) -> Array:
+        data.qpos[:] = model.qpos0
+        mujoco.mj_integratePos(model, data.qpos, dq, 1.0)
+        data.qvel[:] = dv
+        mujoco.mj_step1(model, data)
+        return np.array(read())
+
+    none, unit = np.zeros(model.nv), np.eye(model.nv) * _STEP
+    columns = [(at(e, none) - at(-e, none)) / (2 * _STEP) for e in unit]
+    columns += [(at(none, e) - at(none, -e)) / (2 * _STEP) for e in unit]
+    return readings.units, at(none, none), np.array(columns).T.reshape(len(readings.units), -1)

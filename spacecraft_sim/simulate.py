@@ -1,0 +1,86 @@
+"""The only loop: an environment, and the flight of one episode."""
+
+from collections.abc import Callable
+from typing import Any
+
+import dm_env
+import numpy as np
+from dm_control.rl import control
+
+from spacecraft_sim.task import ControlTask
+from spacecraft_sim.trajectory import Recorder, Trajectory
+
+
+class Environment(control.Environment):
+    """dm_control's environment for a plant that lands on thrust edges inside a control step."""
+
+    _task: ControlTask
+
+    def __init__(self, physics: Any, task: ControlTask, *, duration: float, substeps: int):
+        interval = substeps * physics.timestep()
+        super().__init__(physics, task, time_limit=duration, n_sub_steps=substeps)
+        # A control step may be shortened by the end of the flight, never lengthened.
+        self._interval, self._duration = interval, duration
+
+    def step(self, action: Any) -> dm_env.TimeStep:
+        """Flies one control step.
+
+        Args:
+            action: Extra command of an outside agent, as `action_spec` says.
+
+        Returns:
+            The time step; LAST when the flight's duration is over.
+
+        Raises:
+            PhysicsError: If the plant diverged; what was recorded stays in `task.recorder`.
+        """
+        if self._reset_next_step:
+            return self.reset()
+        physics, task = self._physics, self._task
+        self._step_count += 1
+        end = min(self._step_count * self._interval, self._duration)
+        task.before_step(action, physics)
+        task.fly(physics, end)
+        physics.check_divergence()
+        self._reset_next_step = end == self._duration
+        kind = dm_env.StepType.LAST if self._reset_next_step else dm_env.StepType.MID
+        return dm_env.TimeStep(kind, task.get_reward(physics), 1.0, task.get_observation(physics))
+
+    @property
+    def duration(self) -> float:
+        """Length of an episode, s."""
+        return self._duration
+
+
+def simulate(
+    environment: Environment,
+    *,
+    meta: dict[str, Any],
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Flies one episode without an outside agent and records it.
+
+    Args:
+        environment: The environment.
+        meta: Plain data to keep with the trajectory.
+        progress: Called with the simulated time after each control step, s.
+
+    Returns:
+        The flight; if the plant diverged, the rows before, with the reason in `meta["diverged"]`.
+    """
+    task, physics = environment.task, environment.physics
+    recorder = task.recorder = Recorder(task.units(physics))
+    action = np.zeros(environment.action_spec().shape)
+    try:
+        step = environment.reset()
+        while not step.last():
+            step = environment.step(action)
+            if progress:
+                progress(physics.time())
+    except control.PhysicsError as error:
+        meta = {**meta, "diverged": str(error)}
+    finally:
+        task.recorder = None
+    return recorder.trajectory(meta)
+
+

@@ -1,0 +1,318 @@
+"""The task of a flight: measure -> controller -> thrusters -> plant, on either plant."""
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from dm_control.rl import control
+from dm_env import specs
+
+from spacecraft_sim.controller import Controller
+from spacecraft_sim.disturbance import Disturbance
+from spacecraft_sim.scenario import Initial
+from spacecraft_sim.thrusters import Thrusters
+from spacecraft_sim.trajectory import Recorder
+
+class Plant(Protocol):
+    """What a task needs of a plant; `MujocoPhysics` and `ReducedPhysics` both have it."""
+
+    inputs: tuple[str, ...]
+    units: dict[str, str]
+
+    def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]: ...
+    def set_initial(self, initial: Initial) -> None: ...
+    def begin(self, value: Sequence[float], slope: Sequence[float]) -> None: ...
+    def advance(self, t: float) -> None: ...
+    def coordinates(self) -> list[float]: ...
+    def coordinate_units(self) -> dict[str, str]: ...
+    def time(self) -> float: ...
+    def timestep(self) -> float: ...
+
+
+class ControlTask(control.Task):
+    """Flies a controller, closed inside the task; an outside agent may add to its command.
+
+    Action: an extra command for every thruster channel, added to the controller's, N or N m, within
+    plus and minus the channel's highest level; a relay delivers the nearest of its levels.
+    Observation: every reading of the plant by name, SI units.
+    Reward: 1/(1 + (angle/accuracy)^2), where the angle is that of `attitude_*`, rad; 1 on target,
+    1/2 at the accuracy asked for.
+
+    Attributes:
+        recorder: Collects rows while it is set.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        thrusters: Thrusters,
+        *,
+        initial: Initial,
+        disturbance: Disturbance,
+        accuracy: float = 1e-2,
+        seed: int = 0,
+    ):
+        for name in controller.thrusters:
+            thrusters[name]  # raises if there is no such channel
+            if controller.period is None and thrusters[name].delay.mean == 0:
+                raise ValueError(
+                    f"thruster {name!r} has no delay and the law no sampling period: a relay in "
+                    "continuous time would chatter; set thrusters.*.delay or controller.period"
+                )
+        self.recorder: Recorder | None = None
+        self._controller, self._thrusters = controller, thrusters
+        self._initial, self._disturbance = initial, disturbance
+        self._accuracy = accuracy
+        self._random = np.random.default_rng(seed)
+        self._channels = [thrusters.names.index(name) for name in controller.thrusters]
+
+    # -- what dm_control asks for ---------------------------------------------------------------
+
+    def initialize_episode(self, physics: Any) -> None:
+        """Places the plant at its start and takes the first decision.
+
+        Args:
+            physics: The plant.
+        """
+        wanted = (*self._thrusters.names, *self._disturbance.names)
+        if physics.inputs != wanted:
+            raise ValueError(f"the plant's inputs are {physics.inputs}, the task's {wanted}")
+        physics.set_initial(_scattered(self._initial, self._random))
+        self._measure = physics.select(self._controller.sensors)
+        self._read = physics.select(tuple(physics.units))
+        self._attitude = physics.select(
+            tuple(name for name in physics.units if name.startswith("attitude_"))
+        )
+        self._memory = self._controller.init()
+        self._state = self._thrusters.init()
+        self._extra = [0.0] * len(self._thrusters.names)
+        self._command = [0.0] * len(self._thrusters.names)
+        self._impulse = [0.0] * len(wanted)
+        self._spent = [0.0] * len(self._thrusters.names)
+        self._samples = 0
+        self._decide(physics.time())
+        self._record(physics)
+
+    def before_step(self, action: Any, physics: Any) -> None:
+        """Takes the agent's extra command for the coming control step.
+
+        Args:
+            action: Extra command, shape (n_thrusters,), N or N m.
+            physics: The plant.
+        """
+        extra = np.asarray(action, dtype=float).tolist()
+        if extra != self._extra:
+            self._extra = extra
+            self._issue(physics.time())
+
+    def action_spec(self, physics: Any) -> specs.BoundedArray:
+        """Returns the bounds of the extra command.
+
+        Args:
+            physics: The plant.
+        """
+        highest = np.array([max(spec.levels) for spec in self._thrusters.specs])
+        return specs.BoundedArray(highest.shape, float, -highest, highest, name="extra_command")
+
+    def get_observation(self, physics: Any) -> OrderedDict[str, np.ndarray]:
+        """Returns every reading by name.
+
+        Args:
+            physics: The plant.
+        """
+        return OrderedDict(zip(physics.units, np.array(self._read()), strict=True))
+
+    def get_reward(self, physics: Any) -> float:
+        """Returns 1/(1 + (angle/accuracy)^2).
+
+        Args:
+            physics: The plant.
+        """
+        error = sum(x * x for x in self._attitude())
+        return 1 / (1 + error / self._accuracy**2)
+
+    # -- the flight ------------------------------------------------------------------------------
+
+    def fly(self, physics: Plant, end: float) -> None:
+        """Carries the plant to `end` through smooth pieces.
+
+        A piece ends at the next whole step, thrust edge, sample or control step; a law in
+        continuous time ends it earlier, at the instant at which its command changes.
+
+        Args:
+            physics: The plant.
+            end: Time to reach, s.
+        """
+        thrusters, disturbance, period = self._thrusters, self._disturbance, self._controller.period
+        longest, t = physics.timestep(), physics.time()
+        thrust, slope = thrusters.output(t, self._state)
+        edge = thrusters.next_edge(t, self._state)
+        while t < end:
+            # Equal steps to the end; the small allowance keeps rounding from adding one more.
+            steps = math.ceil((end - t) / longest - 1e-9)
+            sample = math.inf if period is None else self._samples * period
+            stop = min(end if steps == 1 else t + (end - t) / steps, edge, sample)
+            torque, rate = disturbance.line(t, stop)
+            value, rates = thrust + torque, slope + rate
+            physics.begin(value, rates)
+            physics.advance(stop)
+            decided = stop == sample
+            if period is None:
+                stop, decided = self._switching(physics, stop)
+            self._accumulate(value, rates, stop - t)
+            t = stop
+            if decided:
+                self._decide(t)
+            if decided or t == edge:
+                self._trace = self._trace[-1:]
+                thrust, slope = thrusters.output(t, self._state)
+                edge = thrusters.next_edge(t, self._state)
+                self._record(physics)
+            elif any(slope):
+                thrust, slope = thrusters.output(t, self._state)
+        self._record(physics)
+
+    def _switching(self, physics: Plant, stop: float) -> tuple[float, bool]:
+        """Finds the first instant of the open piece at which the command changes, if it does.
+
+        The plant is carried again from the opening to each trial instant.  It is left at the end of
+        the piece, or at the instant found, where the event function is no longer positive.
+        """
+
+        def carried_to(t: float) -> float:
+            physics.advance(t)
+            return self._least_event(t)
+
+        before, here = self._trace[-1], (stop, self._least_event(stop))
+        if here[1] > 0 and (dip := _suspected_dip(*self._trace, here)):
+            inside = dip, carried_to(dip)
+            here = inside if inside[1] <= 0 else (stop, carried_to(stop))
+        if here[1] <= 0:
+            here = _first_not_positive(carried_to, before, here)
+            physics.advance(here[0])
+        self._trace = [before, here]
+        return here[0], here[1] <= 0
+
+    def _least_event(self, t: float) -> float:
+        return min(self._controller.events(t, self._measure(), self._memory), default=1.0)
+
+    def _decide(self, t: float) -> None:
+        """Lets the controller step on the present readings and issues its command."""
+        u, self._memory = self._controller.step(t, self._measure(), self._memory)
+        self._samples += 1
+        for i, level in zip(self._channels, u, strict=True):
+            self._command[i] = float(level)
+        self._issue(t)
+        self._trace = [(t, self._least_event(t))]
+
+    def _issue(self, t: float) -> None:
+        total = [c + e for c, e in zip(self._command, self._extra, strict=True)]
+        self._state = self._thrusters.command(t, total, self._state)
+
+    # -- the record ------------------------------------------------------------------------------
+
+    def units(self, physics: Plant) -> dict[str, str]:
+        """Returns the signals of a row of the recorder, with their units.
+
+        `<thruster>` is the thrust, `<thruster>_command` the law's command, `<input>_impulse` the
+        time integral of an input and `<thruster>_spent` that of its magnitude.
+
+        Args:
+            physics: The plant.
+        """
+        channels, inputs = self._thrusters.names, physics.inputs
+        return {
+            **physics.units,
+            **dict.fromkeys(inputs, "N or N m"),
+            **{f"{name}_command": "N or N m" for name in channels},
+            **{f"{name}_impulse": "N s or N m s" for name in inputs},
+            **{f"{name}_spent": "N s or N m s" for name in channels},
+            **physics.coordinate_units(),
+        }
+
+    def _record(self, physics: Plant) -> None:
+        if self.recorder is None:
+            return
+        t = physics.time()
+        thrust, _ = self._thrusters.output(t, self._state)
+        self.recorder.add(
+            [
+                *(t, *self._read(), *thrust, *self._disturbance.value(t)),
+                *(*self._command, *self._impulse, *self._spent, *physics.coordinates()),
+            ]
+        )
+
+    def _accumulate(self, value: list[float], slope: list[float], span: float) -> None:
+        """Adds a piece to the impulses; no thrust changes its sign within one."""
+        spent = self._spent
+        for i, (v, s) in enumerate(zip(value, slope, strict=True)):
+            impulse = span * (v + s * span / 2)
+            self._impulse[i] += impulse
+            if i < len(spent):
+                spent[i] += abs(impulse)
+
+
+Point = tuple[float, float]  # time, least event function
+
+
+def _suspected_dip(earlier: Point, before: Point, here: Point | None = None) -> float | None:
+    """Where a parabola through three points dips between the last two, if it may reach zero there.
+
+    While the function curves upwards its slope over the last piece was steeper than it is now: only
+    if that slope leads below zero can there be a pair of zeros between two positive ends.
+    """
+    if here is None:
+        return None
+    (t0, f0), (t1, f1), (t2, f2) = earlier, before, here
+    slope = (f1 - f0) / (t1 - t0)
+    if slope >= 0 or f1 + slope * (t2 - t1) > 0:
+        return None
+    curvature = ((f2 - f1) / (t2 - t1) - slope) / (t2 - t0)
+    dip = (t0 + t1) / 2 - slope / (2 * curvature)
+    return dip if t1 < dip < t2 else None
+
+
+def _first_not_positive(function: Callable[[float], float], a: Point, b: Point) -> Point:
+    """Narrows a sign change to the width of the clock's last bits.
+
+    Illinois steps, kept inside the bracket, with a bisection every fourth.
+
+    Args:
+        function: The event function.
+        a: Left end, where it is positive.
+        b: Right end, where it is not.
+
+    Returns:
+        The right end of the final bracket.
+    """
+    (ta, fa), (tb, fb) = a, b
+    width = max(1e-12, 4 * math.ulp(tb))
+    weight_a = weight_b = 1.0
+    for k in range(200):
+        if tb - ta <= width or fb == 0:
+            break
+        left, right = weight_a * fa, weight_b * fb
+        t = (ta + tb) / 2 if k % 4 == 3 else tb - right * (tb - ta) / (right - left)
+        t = min(max(t, ta + width / 2), tb - width / 2)
+        f = function(t)
+        if f > 0:
+            ta, fa, weight_a, weight_b = t, f, 1.0, weight_b / 2
+        else:
+            tb, fb, weight_b, weight_a = t, f, 1.0, weight_a / 2
+    return tb, fb
+
+
+def _scattered(initial: Initial, random: np.random.Generator) -> Initial:
+    """The initial state with its components that are not zero moved at random."""
+
+    def moved(vector: Sequence[float], half_width: float) -> tuple[float, ...]:
+        return tuple(x + half_width * random.uniform(-1, 1) if x else x for x in vector)
+
+    return initial.model_copy(
+        update={
+            "attitude": moved(initial.attitude, initial.attitude_scatter),
+            "rate": moved(initial.rate, initial.rate_scatter),
+        }
+    )

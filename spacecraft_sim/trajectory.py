@@ -1,0 +1,142 @@
+"""A recorded flight: time, signals by name, units; how it is collected, saved and loaded."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """A flight of one plant.
+
+    Rows stand at every control step and at every instant at which a command or a thrust changes;
+    thrust and command are those just after the instant.
+
+    Attributes:
+        time: Time of each row, ascending, shape (n,), s.
+        signals: Values by name, each of shape (n,).
+        units: SI unit of each signal.
+        meta: Plain data about the flight: plant, scenario, versions.
+    """
+
+    time: Array
+    signals: dict[str, Array]
+    units: dict[str, str]
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.signals:
+            raise KeyError(f"signal {name!r} is not recorded; there are: {', '.join(self.signals)}")
+        return self.signals[name]
+
+    def save(self, path: Path) -> None:
+        """Writes a Parquet file: a column `time` and one a signal, units in the metadata.
+
+        Args:
+            path: The file.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        units = {"time": "s", **self.units}
+        columns = {"time": self.time, **self.signals}
+        schema = pa.schema(
+            [pa.field(name, pa.float64(), metadata={"unit": units[name]}) for name in columns],
+            metadata={"spacecraft_sim": json.dumps({"units": units, "meta": self.meta})},
+        )
+        table = pa.table([pa.array(column) for column in columns.values()], schema=schema)
+        pq.write_table(table, path, compression="zstd")
+
+    @staticmethod
+    def load(path: Path) -> "Trajectory":
+        """Reads a file that `save` wrote.
+
+        Args:
+            path: The file.
+
+        Raises:
+            ValueError: If the file is not such a file.
+        """
+        import pyarrow.parquet as pq
+
+        table = pq.read_table(path)
+        described = (table.schema.metadata or {}).get(b"spacecraft_sim")
+        if described is None:
+            raise ValueError(f"{path}: not a trajectory; it has no metadata 'spacecraft_sim'")
+        about = json.loads(described)
+        signals = {name: table[name].to_numpy() for name in table.column_names}
+        time = signals.pop("time")
+        about["units"].pop("time")
+        return Trajectory(time=time, signals=signals, units=about["units"], meta=about["meta"])
+
+
+class Recorder:
+    """Collects the rows of a flight.
+
+    Attributes:
+        units: Signal names, in the order of every row, with their units.
+    """
+
+    def __init__(self, units: dict[str, str]):
+        self.units = units
+        self._rows: list[list[float]] = []
+
+    def add(self, row: list[float]) -> None:
+        """Appends a row, or replaces the last one if it stands at the same instant.
+
+        Args:
+            row: Time, then the signals in order.
+        """
+        if self._rows and self._rows[-1][0] == row[0]:
+            self._rows[-1] = row
+        else:
+            self._rows.append(row)
+
+    def trajectory(self, meta: dict[str, Any]) -> Trajectory:
+        """Returns what was recorded so far.
+
+        Args:
+            meta: Plain data about the flight.
+        """
+        table = np.array(self._rows, dtype=float).reshape(-1, 1 + len(self.units)).T
+        table.setflags(write=False)
+        signals = dict(zip(self.units, table[1:], strict=True))
+        return Trajectory(time=table[0], signals=signals, units=self.units, meta=meta)
+
+
+def peak(time: Array, value: Array, rate: Array) -> tuple[float, float]:
+    """Finds the largest |value| of a sampled signal with known rates, between the samples too.
+
+    Each interval is a cubic Hermite polynomial, whose interior extrema are roots of a quadratic.
+
+    Args:
+        time: Sample times, shape (n,), s.
+        value: Samples, shape (n,).
+        rate: Time derivatives of the samples, shape (n,).
+
+    Returns:
+        The largest |value| and its time, s.
+
+    Raises:
+        ValueError: If there are no samples.
+    """
+    if len(time) == 0:
+        raise ValueError("no samples: the flight ended before the interval that is measured")
+    span = np.diff(time)
+    x0, x1, d0, d1 = value[:-1], value[1:], rate[:-1] * span, rate[1:] * span
+    # x(s) = x0 + d0 s + b s^2 + a s^3 on 0 <= s <= 1
+    a, b = 2 * (x0 - x1) + d0 + d1, 3 * (x1 - x0) - 2 * d0 - d1
+    root = np.sqrt(np.maximum(b * b - 3 * a * d0, 0.0))
+    q = -(b + np.copysign(root, b))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        candidates = np.stack([q / (3 * a), d0 / q])
+    s = np.where((candidates > 0) & (candidates < 1), candidates, 0.0)
+    inner = np.abs(x0 + s * (d0 + s * (b + s * a)))
+    times, values = np.r_[time, (time[:-1] + s * span).ravel()], np.r_[np.abs(value), inner.ravel()]
+    worst = int(np.argmax(values))
+    return float(values[worst]), float(times[worst])
