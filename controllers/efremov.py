@@ -4,14 +4,15 @@ M. S. Efremov, A. E. Polyakov, V. V. Strygin, "An algorithm of active stabilizat
 with viscoelastic elements under conditions of uncertainty", J. Appl. Math. Mech. 70 (2006) 723-733.
 
 Plant.  The quasi-rigid angle beta = J gamma + 2 sum p_i q_i of bus and booms obeys
-beta'' = u(t - h(t)) + f whatever the booms do (1.6).  Here beta, v = beta', u and f are divided by J:
-rad, rad/s, rad/s^2.  Of the delay only 0 < h(t) < h0 is known.
+beta'' = u(t - h(t)) + f whatever the booms do (1.6).  Here beta, v = beta', u and f are divided by
+J: rad, rad/s, rad/s^2.  Of the delay only 0 < h(t) < h0 is known.
 
-Law.  Two pulses of one level bring (beta, v) near the origin (section 2); then the multi-level relay
-of Theorem 2, u = -A sign s with s = c beta + v and A = p 3^k, k the number of thresholds v_n <= |s|.
+Law.  Two pulses of one level bring (beta, v) near the origin (section 2); then the multi-level
+relay of Theorem 2, u = -A sign s with s = c beta + v and A = p 3^k, k the number of thresholds
+v_n <= |s|.
 
-Guaranteed, if |f| < v1 c/2 and the region |beta|, |v| < R is entered: |beta| < eps from some time on.
-The printed claim |v| < eps is false in general; what the repaired proof gives is
+Guaranteed, if |f| < v1 c/2 and the region |beta|, |v| < R is entered: |beta| < eps from some time
+on.  The printed claim |v| < eps is false in general; what the repaired proof gives is
 S = (p + v1 c/2) (E - 1)/(c (2 - E)), E = exp(c h0), and in the end |s| <= S, |beta| <= S/c,
 |v| <= 2 S.  Nothing is promised about the attitude gamma: it swings on while beta is still.
 """
@@ -280,9 +281,7 @@ def _hardware(
     age = spec.delay.longest + (law.period or 0.0)
     lag = max(spec.rise_time, spec.fall_time, spec.min_on_time)
     return (
-        Assumption(
-            text="delay and sampling period < h0", value=age, limit=max_delay, unit="s"
-        ),
+        Assumption(text="delay and sampling period < h0", value=age, limit=max_delay, unit="s"),
         Assumption(
             text="thrust follows the valve at once", value=lag, limit=0.0, relation="<=", unit="s"
         ),

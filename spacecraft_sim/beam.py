@@ -11,10 +11,10 @@ two data sets (controllers/ERRATA.md).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import roots_jacobi, roots_legendre
 
 from spacecraft_sim.checks import positive
@@ -46,7 +46,9 @@ def wave_numbers(n: int) -> Array:
     """Returns the first n roots z of cos z cosh z = -1, shape (n,)."""
     # 1/cosh keeps the function bounded; the roots lie pi apart, close to (i - 1/2) pi.
     centres = (np.arange(1, n + 1) - 0.5) * np.pi
-    return np.array([brentq(lambda z: np.cos(z) + 1 / np.cosh(z), x - 0.5, x + 0.5) for x in centres])
+    return np.array(
+        [_root(lambda z: np.cos(z) + 1 / np.cosh(z), x - 0.5, x + 0.5) for x in centres]
+    )
 
 
 def cantilever_frequencies(
@@ -66,9 +68,7 @@ def cantilever_frequencies(
     Raises:
         ValueError: If an argument is not positive and finite.
     """
-    positive(
-        length=length, linear_density=linear_density, bending_stiffness=bending_stiffness, n=n
-    )
+    positive(length=length, linear_density=linear_density, bending_stiffness=bending_stiffness, n=n)
     return wave_numbers(n) ** 2 * np.sqrt(bending_stiffness / linear_density) / length**2
 
 
@@ -100,6 +100,12 @@ def mode_shape(order: int, x: Array, length: float, *, derivative: int = 0) -> A
         + sigma * np.sin(phase + quarter)
     )
     return shape * (z / length) ** derivative
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    from scipy.optimize import brentq  # a heavy import that most uses of this module do without
+
+    return brentq(function, low, high, xtol=1e-14)  # pyright: ignore[reportReturnType]
 
 
 def _sigma(z: Array | float) -> Array | float:
@@ -203,9 +209,7 @@ def coupled_frequencies(
     Raises:
         ValueError: If an argument is negative, not finite, or zero where that has no meaning.
     """
-    positive(
-        length=length, linear_density=linear_density, bending_stiffness=bending_stiffness, n=n
-    )
+    positive(length=length, linear_density=linear_density, bending_stiffness=bending_stiffness, n=n)
     positive(bus_inertia=bus_inertia, root_radius=root_radius, zero=True)
     rho = root_radius / length
     inertia = bus_inertia / (2 * linear_density * length**3)  # 2 EI k^4 l^3 J0/(2 m l^3) = J0 w^2
@@ -225,7 +229,7 @@ def coupled_frequencies(
 
     # Freeing the bus lifts one constraint, so each root lies between two clamped wave numbers.
     z = wave_numbers(n + 1)
-    roots = np.array([brentq(determinant, lo, hi, xtol=1e-14) for lo, hi in zip(z, z[1:], strict=False)])
+    roots = np.array([_root(determinant, lo, hi) for lo, hi in pairwise(z)])
     return roots**2 * np.sqrt(bending_stiffness / linear_density) / length**2
 
 
@@ -236,8 +240,9 @@ def hinge_rule(rule: Rule, n: int) -> tuple[Array, Array]:
     the sum of EI w_j (theta_j / w_j)^2, so the hinge at s_j has the stiffness EI/w_j.
 
     Args:
-        rule: `gauss_jacobi` (weight (1 - s)^4, the decay of y''^2 to the free end), the best a
-            segment; `gauss_legendre`; `equal` links with a root spring of 2 EI/h; `mid`-link hinges.
+        rule: `gauss_jacobi` with weight (1 - s)^4, the decay of y''^2 to the free end, the best
+            for its number of hinges; `gauss_legendre`; `equal` links with a root spring of
+            2 EI/h; `mid`-link hinges.
         n: Number of hinges, at least 1.
 
     Returns:

@@ -63,14 +63,13 @@ def read(path: Path) -> Table:
         raise ValueError(f"{path}: not TOML: {error}") from error
 
 
-def write(path: Path, table: Table) -> None:
-    """Writes a table as TOML; floats keep every bit.
+def dumps(table: Table) -> str:
+    """Returns a table as TOML; floats keep every bit.
 
     Args:
-        path: The file.
         table: Plain data without None.
     """
-    path.write_text(tomli_w.dumps(table), encoding="utf-8")
+    return tomli_w.dumps(table)
 
 
 def override(table: Table, assignments: tuple[str, ...]) -> Table:
@@ -119,29 +118,33 @@ def validate(model: type[ModelT], table: Table, *, where: str) -> ModelT:
     Raises:
         ValueError: One line for each fault, with its path and, for an unknown key, the nearest one.
     """
-    try:
-        return model.model_validate(table)
-    except ValidationError as error:
-        lines = [_fault(model, fault) for fault in error.errors()]
-        raise ValueError("\n".join([f"{where}:", *lines])) from None
+    if found := faults(model, table):
+        raise ValueError("\n".join([f"{where}:", *found]))
+    return model.model_validate(table)
 
 
-def unknown_key(path: str, known: list[str]) -> str:
-    """Words the error about a key that does not exist.
+def faults(model: type[Model], table: Table, *, prefix: str = "") -> list[str]:
+    """Returns one line for each fault of a table, none if it is valid.
 
     Args:
-        path: The dotted path of the key.
-        known: The keys allowed there.
+        model: The model.
+        table: Plain data.
+        prefix: Path of the table in a larger one, with its dot.
     """
-    near = difflib.get_close_matches(path.rpartition(".")[2], known, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(known)}"
-    return f"  {path}: unknown key; {hint}"
+    try:
+        model.model_validate(table)
+    except ValidationError as error:
+        return [_fault(model, fault, prefix) for fault in error.errors()]
+    return []
 
 
-def _fault(model: type[BaseModel], fault: Any) -> str:
-    path = ".".join(str(part) for part in fault["loc"])
+def _fault(model: type[BaseModel], fault: Any, prefix: str) -> str:
+    path = prefix + ".".join(str(part) for part in fault["loc"])
     if fault["type"] == "extra_forbidden":
-        return unknown_key(path, _keys(model, fault["loc"][:-1]))
+        known = _keys(model, fault["loc"][:-1])
+        near = difflib.get_close_matches(str(fault["loc"][-1]), known, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(known)}"
+        return f"  {path}: unknown key; {hint}"
     message = fault["msg"].removeprefix("Value error, ")
     value = "" if fault["type"] == "missing" else f", got {fault['input']!r}"
     return f"  {path or 'file'}: {message}{value}"

@@ -8,21 +8,24 @@ from typing import Any, Protocol, runtime_checkable
 class Controller(Protocol):
     """A control law that flies on any plant which has the sensors it names.
 
-    Attributes:
-        sensors: Names of the readings that make up y, in order.
-        thrusters: Names of the channels that make up u, in order.
-        period: Sampling period, s; None for a relay law in continuous time, whose `events` are then
-            located exactly.
+    With a period it is called at every sample; without one it is a relay law in continuous time,
+    called where its `events` say, which are located exactly.
     """
 
     @property
-    def sensors(self) -> tuple[str, ...]: ...
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the readings, in the order of y."""
+        ...
 
     @property
-    def thrusters(self) -> tuple[str, ...]: ...
+    def thrusters(self) -> tuple[str, ...]:
+        """Names of the channels, in the order of u."""
+        ...
 
     @property
-    def period(self) -> float | None: ...
+    def period(self) -> float | None:
+        """Sampling period, s, or None."""
+        ...
 
     def init(self) -> Any:
         """Returns the memory before the first step."""

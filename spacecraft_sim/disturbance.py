@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from spacecraft_sim.config import Model, quantity
 
@@ -17,6 +18,7 @@ class Torque(Model):
     phase: float = quantity("phase of the periodic part", "rad", 0.0)
 
     def __call__(self, t: float) -> float:
+        """Returns the torque at `t`, N m."""
         return self.constant + self.amplitude * math.sin(self.frequency * t + self.phase)
 
 
@@ -27,7 +29,7 @@ class Disturbance:
         names: Input names `disturbance_<axis>`, in order.
     """
 
-    def __init__(self, torques: Mapping[str, Torque]):
+    def __init__(self, torques: Mapping[Any, Torque]):
         self.names = tuple(f"disturbance_{axis}" for axis in torques)
         self._torques = tuple(torques.values())
 

@@ -1,5 +1,8 @@
 """What a compiled spacecraft looks like: its shapes, its jets, and where its bodies are in time."""
 
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
+# (MuJoCo is a compiled module without type stubs)
+
 from dataclasses import dataclass
 
 import mujoco

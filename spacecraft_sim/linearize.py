@@ -3,15 +3,18 @@
 q are the tangent coordinates at the reference configuration.  What is not linear there is refused.
 """
 
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
+# (MuJoCo is a compiled module without type stubs)
+
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from spacecraft_sim import mjcf
+from spacecraft_sim import beam, mjcf
 from spacecraft_sim.readings import Readings, undeformed_mass_matrix
 from spacecraft_sim.scenario import Initial
-from spacecraft_sim.spacecraft import Spacecraft
+from spacecraft_sim.spacecraft import Boom, Spacecraft
 
 Array = np.ndarray
 
@@ -48,9 +51,7 @@ class Linearization:
         """Returns the eigenvalues of the first-order form, shape (2 nv,), 1/s."""
         n = len(self.M)
         stiffness, damping = np.linalg.solve(self.M, self.K), np.linalg.solve(self.M, self.D)
-        return np.linalg.eigvals(
-            np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
-        )
+        return np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
 
 
 def linearize(model: mujoco.MjModel) -> Linearization:
@@ -108,6 +109,42 @@ def initial_state(
         for name, angle in mjcf.bent(boom, initial.boom_mode, initial.boom_amplitude).items():
             tangent[model.joint(name).dofadr[0]] = angle
     return tangent, rate
+
+
+def planar_bus(model: mujoco.MjModel, spacecraft: Spacecraft) -> tuple[float, float, Boom]:
+    """Returns bus inertia about z, root radius and boom of a machine that (1.4)-(1.5) describe.
+
+    Args:
+        model: The compiled spacecraft.
+        spacecraft: The machine.
+
+    Returns:
+        J0, kg m^2; r, m; one of the two booms.
+
+    Raises:
+        ValueError: If there are not two equal booms on opposite sides, without tip masses.
+    """
+    twins = {repr(boom.model_copy(update={"name": "", "root": ""})) for boom in spacecraft.booms}
+    roots = [model.site(boom.root).pos for boom in spacecraft.booms]
+    if len(roots) != 2 or len(twins) != 1 or np.any(np.abs(roots[0] + roots[1]) > 1e-9):
+        raise ValueError(
+            f"{spacecraft.name}: a Galerkin model needs two equal booms rooted on opposite sides; "
+            'this has others: set reduced.source = "mjcf"'
+        )
+    boom, radius = spacecraft.booms[0], float(np.linalg.norm(roots[0]))
+    if boom.tip_mass:
+        raise ValueError(
+            f"booms.*.tip_mass = {boom.tip_mass}: the cantilever shapes of the Galerkin model have "
+            'none; set reduced.source = "mjcf"'
+        )
+    about_z = _rigid_dofs(model)[-1]
+    booms = beam.total_inertia(
+        bus_inertia=0.0,
+        root_radius=radius,
+        length=boom.length,
+        linear_density=boom.linear_density,
+    )
+    return float(undeformed_mass_matrix(model)[about_z, about_z] - booms), radius, boom
 
 
 def _refuse_nonlinear(model: mujoco.MjModel) -> None:

@@ -5,6 +5,9 @@ adds what a flight needs: a time step, inputs that may change linearly in time, 
 torques on the bus.
 """
 
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
+# (MuJoCo is a compiled module without type stubs)
+
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -13,7 +16,7 @@ import numpy as np
 
 from spacecraft_sim import beam
 from spacecraft_sim.checks import choices
-from spacecraft_sim.spacecraft import Boom, Spacecraft
+from spacecraft_sim.spacecraft import Boom, Spacecraft, Thruster
 
 BUS = "bus"  # the body that carries booms, thrusters and disturbances
 AXES = ("x", "y", "z")
@@ -44,20 +47,31 @@ def assemble(spacecraft: Spacecraft) -> mujoco.MjSpec:
     for boom in spacecraft.booms:
         _grow(spec, boom, spacecraft)
     actuators = [actuator.name for actuator in spec.actuators]
-    for name in (a for thruster in spacecraft.thrusters for a in motors(thruster)):
+    for name in (a for names in channels(spacecraft, ()).values() for a in names):
         if name not in actuators:
             raise ValueError(choices("actuator", name, actuators, where=spacecraft.xml.name))
     spec.modelname = spacecraft.name
     return spec
 
 
-def motors(thruster) -> tuple[str, ...]:
+def motors(thruster: Thruster) -> tuple[str, ...]:
     """Returns the names of the MJCF actuators that a thruster channel fires together.
 
     Args:
         thruster: The channel.
     """
     return thruster.actuators or (thruster.name,)
+
+
+def channels(spacecraft: Spacecraft, disturbances: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Returns the inputs of a flight and the actuators that each of them drives.
+
+    Args:
+        spacecraft: The machine.
+        disturbances: Names of disturbance inputs.
+    """
+    wiring = {thruster.name: motors(thruster) for thruster in spacecraft.thrusters}
+    return wiring | {name: (name,) for name in disturbances}
 
 
 def compile(
@@ -79,7 +93,7 @@ def compile(
     Raises:
         ValueError: If the machine has gravity or contacts on, or a thruster is not a plain motor.
     """
-    spec = assemble(spacecraft)
+    spec, disturbances = assemble(spacecraft), tuple(disturbances)
     for name in disturbances:
         axis = AXES.index(name.removeprefix("disturbance_"))
         site = spec.body(BUS).add_site(name=name)
@@ -89,9 +103,9 @@ def compile(
             trntype=mujoco.mjtTrn.mjTRN_SITE,
             gear=np.r_[0.0, 0.0, 0.0, np.eye(3)[axis]],
         )
-    inputs = {a for thruster in spacecraft.thrusters for a in motors(thruster)} | set(disturbances)
+    driven = {a for names in channels(spacecraft, disturbances).values() for a in names}
     for actuator in spec.actuators:
-        if actuator.name in inputs:
+        if actuator.name in driven:
             _follow_lines(actuator, spacecraft)
     spec.option.timestep = timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
@@ -170,7 +184,9 @@ def _grow(spec: mujoco.MjSpec, boom: Boom, spacecraft: Spacecraft) -> None:
         point = body.add_body(name=f"{boom.name}_tip_mass", pos=tip)
         _inertial(point, boom.tip_mass, [0, 0, 0], inertia)
         point.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[3 * _RADIUS, 0, 0], **_drawn([0.8, 0.3, 0.2, 1])
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[3 * _RADIUS, 0, 0],
+            **_drawn([0.8, 0.3, 0.2, 1]),
         )
     spec.add_sensor(
         name=f"{boom.name}_tip",

@@ -6,6 +6,9 @@ again, it starts again from the opening, which is how a switching instant is loc
 one RK4 step, so thrust edges fall on step ends and the order 4 survives them.
 """
 
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
+# (MuJoCo is a compiled module without type stubs)
+
 import os
 from collections.abc import Callable, Iterable, Sequence
 
@@ -25,7 +28,9 @@ from spacecraft_sim.spacecraft import Spacecraft
 
 Array = np.ndarray
 
-RK4_LIMIT = 2.5  # |lambda| dt on the left half plane's boundary; exactly 2.785 real, 2.828 imaginary
+RK4_LIMIT = (
+    2.5  # |lambda| dt on the left half plane's boundary; exactly 2.785 real, 2.828 imaginary
+)
 
 
 class MujocoPhysics(dm_mujoco.Physics):
@@ -57,16 +62,12 @@ class MujocoPhysics(dm_mujoco.Physics):
         model = mjcf.compile(spacecraft, timestep=timestep, disturbances=disturbances)
         require_stable_step(model, timestep)
         physics = cls.from_model(wrapper.MjModel(model))
-        channels = [(t.name, mjcf.motors(t)) for t in spacecraft.thrusters]
-        channels += [(name, (name,)) for name in disturbances]
-        physics._connect(spacecraft, channels)
+        physics._connect(spacecraft, mjcf.channels(spacecraft, disturbances))
         return physics
 
-    def _connect(
-        self, spacecraft: Spacecraft, channels: Sequence[tuple[str, tuple[str, ...]]]
-    ) -> None:
+    def _connect(self, spacecraft: Spacecraft, channels: dict[str, tuple[str, ...]]) -> None:
         model, data = self.model.ptr, self.data.ptr
-        self.inputs = tuple(name for name, _ in channels)
+        self.inputs = tuple(channels)
         self._spacecraft = spacecraft
         self._readings = Readings(model, data)
         self.units = self._readings.units
@@ -74,7 +75,7 @@ class MujocoPhysics(dm_mujoco.Physics):
         # Activation k follows input i.
         wiring = {
             int(model.actuator(a).actadr[0]): i
-            for i, (_, actuators) in enumerate(channels)
+            for i, actuators in enumerate(channels.values())
             for a in actuators
         }
         self._wiring = sorted(wiring.items())
@@ -234,7 +235,7 @@ def require_stable_step(model: mujoco.MjModel, timestep: float) -> None:
     fastest = float(np.max(np.abs(linearize.linearize(model).eigenvalues()), initial=0.0))
     if fastest * timestep >= RK4_LIMIT:
         raise ValueError(
-            f"timestep {timestep} s is over the stability limit {RK4_LIMIT / fastest:.4g} s of RK4: "
-            f"the fastest eigenvalue of the model has |lambda| = {fastest:.4g} 1/s and "
+            f"timestep {timestep} s is over the stability limit {RK4_LIMIT / fastest:.4g} s of "
+            f"RK4: the fastest eigenvalue of the model has |lambda| = {fastest:.4g} 1/s and "
             f"|lambda| dt must stay below {RK4_LIMIT}; take a smaller step or fewer hinges"
         )

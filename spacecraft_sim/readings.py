@@ -1,15 +1,19 @@
 """Named scalar readings of a compiled model: its MJCF sensors, and its quasi-rigid motion.
 
-A vector sensor `rate` is read as `rate_x`, `rate_y`, `rate_z`; a quaternion sensor `attitude` as the
-three components of its rotation vector.  Added to these, for the axes in which the bus can turn:
+A vector sensor `rate` is read as `rate_x`, `rate_y`, `rate_z`; a quaternion sensor `attitude` as
+the three components of its rotation vector.  Added to these, for the axes about which the bus can
+turn:
 
-- `angular_momentum_<axis>`: of the whole machine, about the axis of a hinged bus or about the centre
-  of mass of a free one, world frame, N m s;
+- `angular_momentum_<axis>`: of the whole machine, about the axis of a hinged bus or about the
+  centre of mass of a free one, world frame, N m s;
 - `quasi_rigid_rate_<axis>`: that momentum over the undeformed inertia, v/J of Efremov (1.6), rad/s;
   with no external torque it is constant, whatever the booms do;
 - `quasi_rigid_angle_<axis>`: beta/J, the attitude that the machine would have with its booms
   straight, linear in the joint coordinates, rad.
 """
+
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
+# (MuJoCo is a compiled module without type stubs)
 
 import math
 from collections.abc import Callable

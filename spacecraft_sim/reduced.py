@@ -1,7 +1,7 @@
 """The reduced plant: the rigid motion and a few elastic modes, propagated exactly.
 
-q'' = B_r u for the rigid coordinates, z' = lambda z + b u for each elastic eigenvalue; y is linear in
-both.  The inputs are linear in time over a piece, for which the solution is a closed form.
+q'' = B_r u for the rigid coordinates, z' = lambda z + b u for each elastic eigenvalue; y is linear
+in both.  The inputs are linear in time over a piece, for which the solution is a closed form.
 """
 
 from collections.abc import Callable, Mapping, Sequence

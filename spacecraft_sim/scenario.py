@@ -38,16 +38,17 @@ class Reduced(Model):
     modes: int = quantity("elastic modes kept", "", 1, ge=0)
 
 
-def _changes(part: type[Model]) -> type[Model]:
+def _changes(part: type[Model]) -> Any:
     """The model of a table that changes some numbers of a part and leaves the others."""
     fields: dict[str, Any] = {
-        name: (field.annotation | None, Field(None, description=field.description))
+        name: (field.rebuild_annotation() | None, Field(None, description=field.description))
         for name, field in part.model_fields.items()
         if name != "name"
     }
     return create_model(f"{part.__name__}Changes", __base__=Model, **fields)
 
 
+# pyright: reportInvalidTypeForm=false
 BoomChanges, ThrusterChanges = _changes(Boom), _changes(Thruster)
 
 

@@ -82,5 +82,3 @@ def simulate(
     finally:
         task.recorder = None
     return recorder.trajectory(meta)
-
-

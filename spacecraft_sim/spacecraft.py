@@ -53,6 +53,7 @@ class Delay(Model):
         return self.mean + abs(self.amplitude)
 
     def __call__(self, t: float) -> float:
+        """Returns h(t), s."""
         return self.mean + self.amplitude * math.sin(self.frequency * t + self.phase)
 
     def arrival(self, t: float) -> float:
@@ -81,7 +82,7 @@ class Delay(Model):
 
 
 class Failure(Model):
-    """From `time` on the thruster delivers `level` whatever is commanded: stuck off, or stuck on."""
+    """From `time` on the thruster delivers `level` whatever is commanded: stuck off or on."""
 
     time: float = quantity("time of the failure", "s", ge=0)
     level: float = quantity("level it is stuck at; 0 is stuck off", "N or N m", 0.0)

@@ -3,7 +3,7 @@
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from dm_control.rl import control
@@ -11,24 +11,10 @@ from dm_env import specs
 
 from spacecraft_sim.controller import Controller
 from spacecraft_sim.disturbance import Disturbance
+from spacecraft_sim.plant import Plant
 from spacecraft_sim.scenario import Initial
 from spacecraft_sim.thrusters import Thrusters
 from spacecraft_sim.trajectory import Recorder
-
-class Plant(Protocol):
-    """What a task needs of a plant; `MujocoPhysics` and `ReducedPhysics` both have it."""
-
-    inputs: tuple[str, ...]
-    units: dict[str, str]
-
-    def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]: ...
-    def set_initial(self, initial: Initial) -> None: ...
-    def begin(self, value: Sequence[float], slope: Sequence[float]) -> None: ...
-    def advance(self, t: float) -> None: ...
-    def coordinates(self) -> list[float]: ...
-    def coordinate_units(self) -> dict[str, str]: ...
-    def time(self) -> float: ...
-    def timestep(self) -> float: ...
 
 
 class ControlTask(control.Task):
@@ -70,7 +56,7 @@ class ControlTask(control.Task):
 
     # -- what dm_control asks for ---------------------------------------------------------------
 
-    def initialize_episode(self, physics: Any) -> None:
+    def initialize_episode(self, physics: Plant) -> None:
         """Places the plant at its start and takes the first decision.
 
         Args:
@@ -95,7 +81,7 @@ class ControlTask(control.Task):
         self._decide(physics.time())
         self._record(physics)
 
-    def before_step(self, action: Any, physics: Any) -> None:
+    def before_step(self, action: Any, physics: Plant) -> None:
         """Takes the agent's extra command for the coming control step.
 
         Args:
@@ -107,7 +93,7 @@ class ControlTask(control.Task):
             self._extra = extra
             self._issue(physics.time())
 
-    def action_spec(self, physics: Any) -> specs.BoundedArray:
+    def action_spec(self, physics: Plant) -> specs.BoundedArray:
         """Returns the bounds of the extra command.
 
         Args:
@@ -116,7 +102,7 @@ class ControlTask(control.Task):
         highest = np.array([max(spec.levels) for spec in self._thrusters.specs])
         return specs.BoundedArray(highest.shape, float, -highest, highest, name="extra_command")
 
-    def get_observation(self, physics: Any) -> OrderedDict[str, np.ndarray]:
+    def get_observation(self, physics: Plant) -> OrderedDict[str, np.ndarray]:
         """Returns every reading by name.
 
         Args:
@@ -124,7 +110,7 @@ class ControlTask(control.Task):
         """
         return OrderedDict(zip(physics.units, np.array(self._read()), strict=True))
 
-    def get_reward(self, physics: Any) -> float:
+    def get_reward(self, physics: Plant) -> float:
         """Returns 1/(1 + (angle/accuracy)^2).
 
         Args:
@@ -277,7 +263,7 @@ def _suspected_dip(earlier: Point, before: Point, here: Point | None = None) -> 
 def _first_not_positive(function: Callable[[float], float], a: Point, b: Point) -> Point:
     """Narrows a sign change to the width of the clock's last bits.
 
-    Illinois steps, kept inside the bracket, with a bisection every fourth.
+    Illinois steps, kept inside the bracket, with a bisection every eighth.
 
     Args:
         function: The event function.
@@ -289,18 +275,21 @@ def _first_not_positive(function: Callable[[float], float], a: Point, b: Point) 
     """
     (ta, fa), (tb, fb) = a, b
     width = max(1e-12, 4 * math.ulp(tb))
-    weight_a = weight_b = 1.0
+    weight_a = weight_b = 1.0  # Illinois: an end that is kept twice in a row counts half
+    replaced = ""
     for k in range(200):
         if tb - ta <= width or fb == 0:
             break
         left, right = weight_a * fa, weight_b * fb
-        t = (ta + tb) / 2 if k % 4 == 3 else tb - right * (tb - ta) / (right - left)
+        t = (ta + tb) / 2 if k % 8 == 7 else tb - right * (tb - ta) / (right - left)
         t = min(max(t, ta + width / 2), tb - width / 2)
         f = function(t)
         if f > 0:
-            ta, fa, weight_a, weight_b = t, f, 1.0, weight_b / 2
+            weight_a, weight_b = 1.0, weight_b / 2 if replaced == "a" else 1.0
+            ta, fa, replaced = t, f, "a"
         else:
-            tb, fb, weight_b, weight_a = t, f, 1.0, weight_a / 2
+            weight_b, weight_a = 1.0, weight_a / 2 if replaced == "b" else 1.0
+            tb, fb, replaced = t, f, "b"
     return tb, fb
 
 

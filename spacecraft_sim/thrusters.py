@@ -131,7 +131,9 @@ def _commanded(t: float, level: float, channel: Channel, spec: Thruster) -> Chan
     return Channel(start, kept, _knots(start, kept, spec))
 
 
-def _knots(thrust: float, changes: Sequence[tuple[float, float]], spec: Thruster) -> tuple[Knot, ...]:
+def _knots(
+    thrust: float, changes: Sequence[tuple[float, float]], spec: Thruster
+) -> tuple[Knot, ...]:
     """The thrust that follows the valve, from `thrust` at the first change."""
     if spec.failure:
         time, level = spec.failure.time, spec.failure.level

@@ -1,0 +1,255 @@
+"""The command `spacecraft-sim`: list, explain, run, export.
+
+Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or bad input, 3 the run diverged or crashed.
+Heavy modules are imported by the commands that need them.
+"""
+
+import argparse
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from spacecraft_sim.versions import require_supported_mujoco
+
+if TYPE_CHECKING:
+    from spacecraft_sim.compare import Comparison
+    from spacecraft_sim.mission import Mission
+    from spacecraft_sim.plant import PlantName
+    from spacecraft_sim.trajectory import Trajectory
+
+HOLDS, FAILS, BAD_INPUT, BROKEN = 0, 1, 2, 3
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command.
+
+    Args:
+        argv: Its words; those of the process if left out.
+
+    Returns:
+        The exit code.
+    """
+    arguments = _parser().parse_args(argv)
+    try:
+        return arguments.command(arguments)
+    except ValueError as error:
+        print(f"spacecraft-sim: {error}", file=sys.stderr)
+        return BAD_INPUT
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="spacecraft-sim", description=(__doc__ or "").partition("\n\n")[2]
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def command(function: Callable, summary: str) -> argparse.ArgumentParser:
+        name = function.__name__.strip("_")
+        found = commands.add_parser(name, help=summary, description=summary)
+        found.set_defaults(command=function)
+        return found
+
+    settings = {"nargs": "+", "action": "extend", "default": [], "metavar": "key=value"}
+    command(_list, "list scenarios, spacecraft and laws")
+    explain = command(_explain, "say what a scenario shows, its parameters, what theory predicts")
+    explain.add_argument("name", metavar="NAME", help="scenario, or path of a TOML file")
+    explain.add_argument("--set", help="change a key of the scenario", **settings)
+    run = command(_run, "fly a scenario on MuJoCo and on the reduced model and print the verdicts")
+    run.add_argument("name", metavar="NAME", help="scenario, or path of a TOML file")
+    run.add_argument("--out", type=Path, help="folder to write; default runs/NAME, numbered")
+    run.add_argument("--set", help="change a key of the scenario", **settings)
+    export = command(_export, "write the complete MJCF of a spacecraft as one file")
+    export.add_argument("name", metavar="NAME", help="spacecraft or scenario, or path of its TOML")
+    export.add_argument("file", type=Path, metavar="FILE.xml", help="file to write")
+    return parser
+
+
+# -- list ------------------------------------------------------------------------------------------
+
+
+def _list(_: argparse.Namespace) -> int:
+    from controllers import REGISTRY
+    from spacecraft_sim import config, library
+
+    table = Table("name", "what it is", box=None, pad_edge=False, header_style="bold")
+    for kind, names, title in (
+        ("scenarios", library.scenario_names(), "scenarios"),
+        ("models", library.spacecraft_names(), "spacecraft"),
+    ):
+        table.add_row(f"[bold]{title}[/]")
+        for name in names:
+            folder = library.folder(kind)
+            path = (
+                folder / f"{name}.toml" if kind == "scenarios" else folder / name / f"{name}.toml"
+            )
+            table.add_row(f"  {name}", config.read(path).get("title", ""))
+    table.add_row("[bold]laws[/]")
+    for name, design in REGISTRY.items():
+        table.add_row(f"  {name}", (design.__doc__ or "").partition("\n")[0])
+    _console().print(table)
+    return HOLDS
+
+
+# -- explain ---------------------------------------------------------------------------------------
+
+
+def _explain(arguments: argparse.Namespace) -> int:
+    mission = _assemble(arguments)
+    from spacecraft_sim import explain
+
+    console = _console()
+    scenario = mission.scenario
+    console.print(f"[bold]{scenario.name}[/]: {scenario.title}\n\n{scenario.description.strip()}\n")
+    for heading, rows in explain.parameters(scenario, mission.machine):
+        table = Table("parameter", "value", "default", "unit", "what", title=heading, box=None)
+        _fill(table, rows)
+        console.print(table)
+    claims = Table(
+        "claim", "theory", "bound", "unit", "source", title="what theory predicts", box=None
+    )
+    _fill(claims, explain.predictions(mission.guarantees))
+    console.print(claims)
+    console.print("[bold]assumptions that the design decides[/]")
+    for line in explain.assumptions(mission.guarantees):
+        console.print(f"  {line}", highlight=False)
+    return HOLDS
+
+
+def _fill(table: Table, rows: Sequence[Sequence[str]]) -> None:
+    for row in rows:
+        table.add_row(*row)
+
+
+# -- run -------------------------------------------------------------------------------------------
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    mission = _assemble(arguments)
+    from spacecraft_sim import run_folder
+
+    folder = run_folder.create(arguments.out, mission.scenario.name)
+    try:
+        measured, predicted = _fly(mission, "mujoco"), _fly(mission, "reduced")
+        run_folder.write_flights(folder, mission.scenario, measured, predicted)
+        for flight in (measured, predicted):
+            if reason := flight.meta.get("diverged"):
+                print(f"spacecraft-sim: {reason}\nrecorded so far: {folder}", file=sys.stderr)
+                return BROKEN
+        comparison = mission.judge(measured, predicted)
+        run_folder.write_verdicts(folder, mission, comparison)
+        run_folder.write_pictures(folder, mission, measured, predicted, comparison)
+    except Exception:
+        traceback.print_exc()
+        print(f"spacecraft-sim: the run crashed; what it wrote is in {folder}", file=sys.stderr)
+        return BROKEN
+    console = _console()
+    console.print(_verdict_table(comparison))
+    console.print(_difference_line(comparison))
+    console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
+    console.print(f"open the recording:  rerun {folder / 'recording.rrd'}", highlight=False)
+    return HOLDS if all(verdict.holds for verdict in comparison.verdicts) else FAILS
+
+
+def _fly(mission: "Mission", plant: "PlantName") -> "Trajectory":
+    """Flies one plant with a progress line, if a person is watching."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        return mission.fly(plant)
+    columns = (
+        TextColumn("{task.description:>8}"),
+        TextColumn("{task.completed:8.1f} of {task.total:.1f} s simulated"),
+        TextColumn("{task.fields[factor]:6.0f} x real time"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task(plant, total=mission.scenario.duration, factor=0.0)
+        started = progress.get_time()
+
+        def show(time: float) -> None:
+            elapsed = max(progress.get_time() - started, 1e-9)
+            progress.update(task, completed=time, factor=time / elapsed)
+
+        return mission.fly(plant, progress=show)
+
+
+def _verdict_table(comparison: "Comparison") -> Table:
+    table = Table(
+        "", "claim", "predicted", "measured", "bound", "margin", "source", title="MuJoCo", box=None
+    )
+    for verdict in comparison.verdicts:
+        mark = "[green]holds[/]" if verdict.holds else "[red]FAILS[/]"
+        sign = "+-" if verdict.kind == "within" else "  "
+        table.add_row(
+            mark,
+            verdict.claim,
+            _figure(verdict.predicted, verdict.unit),
+            _figure(verdict.measured, verdict.unit),
+            sign + _figure(verdict.bound, verdict.unit),
+            f"{verdict.margin:.1%}",
+            verdict.source,
+        )
+        for assumption in verdict.failed:
+            table.add_row("", f"  [red]assumption fails: {assumption}[/]")
+    return table
+
+
+def _difference_line(comparison: "Comparison") -> str:
+    worst = [d for d in comparison.differences if d.signal.startswith(("attitude", "quasi_rigid"))]
+    parts = [f"{d.signal} {d.max_error:.3g} {d.unit}" for d in worst]
+    return "MuJoCo minus reduced model, at most: " + ", ".join(parts)
+
+
+def _figure(value: float | None, unit: str) -> str:
+    return "" if value is None else f"{value:.6g} {unit}"
+
+
+# -- export ----------------------------------------------------------------------------------------
+
+
+def _export(arguments: argparse.Namespace) -> int:
+    require_supported_mujoco()
+    from spacecraft_sim import library, mjcf, spacecraft
+
+    name = arguments.name
+    if name in library.scenario_names():
+        from spacecraft_sim import mission
+
+        scenario = mission.load_scenario(name)
+        machine = spacecraft.load(scenario.spacecraft).with_parts(
+            scenario.changes("booms"), scenario.changes("thrusters")
+        )
+    else:
+        machine = spacecraft.load(name)
+    if arguments.file.exists():
+        raise ValueError(f"{arguments.file}: exists already; name a file that does not")
+    try:
+        mjcf.export(machine, arguments.file)
+    except OSError as error:
+        raise ValueError(f"{arguments.file}: cannot be written: {error.strerror}") from error
+    _console().print(f"{arguments.file}: {machine.title}")
+    return HOLDS
+
+
+# -- shared ----------------------------------------------------------------------------------------
+
+
+def _assemble(arguments: argparse.Namespace) -> "Mission":
+    require_supported_mujoco()
+    from spacecraft_sim import mission
+
+    return mission.assemble(mission.load_scenario(arguments.name, tuple(arguments.set)))
+
+
+def _console() -> Console:
+    """Tables keep their width when the output is a file or a pipe."""
+    return Console(width=None if sys.stdout.isatty() else 180)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,248 @@
+"""The composition root: a scenario becomes plants, a law with its guarantees, and flights.
+
+Beside the command line this is the only module that knows the controllers.
+"""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from pydantic import create_model
+
+from controllers import REGISTRY, Design
+from spacecraft_sim import beam, config, conservation, library, linearize, mjcf, reduced, spacecraft
+from spacecraft_sim.checks import choices
+from spacecraft_sim.compare import Comparison, compare
+from spacecraft_sim.controller import Controller
+from spacecraft_sim.disturbance import Disturbance
+from spacecraft_sim.guarantee import Guarantee
+from spacecraft_sim.physics import MujocoPhysics
+from spacecraft_sim.plant import PlantName
+from spacecraft_sim.scenario import Scenario
+from spacecraft_sim.simulate import Environment, simulate
+from spacecraft_sim.spacecraft import Spacecraft
+from spacecraft_sim.task import ControlTask
+from spacecraft_sim.thrusters import Thrusters
+from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.versions import versions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mission:
+    """Everything that a scenario stands for, ready to fly.
+
+    Attributes:
+        scenario: The scenario.
+        machine: The spacecraft with the scenario's changes.
+        mujoco: The full plant.
+        reduced: The reduced plant.
+        controller: The law.
+        guarantees: What is claimed of it.
+        thrusters: The thrusters.
+        disturbance: The disturbance torques.
+    """
+
+    scenario: Scenario
+    machine: Spacecraft
+    mujoco: MujocoPhysics
+    reduced: reduced.ReducedPhysics
+    controller: Controller
+    guarantees: tuple[Guarantee, ...]
+    thrusters: Thrusters
+    disturbance: Disturbance
+
+    def environment(self, plant: PlantName = "mujoco") -> Environment:
+        """Returns a dm_control environment with the law closed inside its task.
+
+        Args:
+            plant: Which plant.
+        """
+        accuracy = self.scenario.controller.get("accuracy", 1e-2)
+        task = ControlTask(
+            self.controller,
+            self.thrusters,
+            initial=self.scenario.initial,
+            disturbance=self.disturbance,
+            accuracy=accuracy,
+            seed=self.scenario.seed,
+        )
+        return Environment(
+            self.mujoco if plant == "mujoco" else self.reduced,
+            task,
+            duration=self.scenario.duration,
+            substeps=self.scenario.simulation.substeps,
+        )
+
+    def fly(
+        self, plant: PlantName = "mujoco", *, progress: Callable[[float], None] | None = None
+    ) -> Trajectory:
+        """Flies the scenario on one plant.
+
+        Args:
+            plant: Which plant.
+            progress: Called with the simulated time, s.
+        """
+        meta = {
+            "plant": plant,
+            "scenario": self.scenario.name,
+            "seed": self.scenario.seed,
+            "versions": versions(),
+        }
+        return simulate(self.environment(plant), meta=meta, progress=progress)
+
+    def judge(self, measured: Trajectory, predicted: Trajectory) -> Comparison:
+        """Checks the guarantees on both flights and compares them.
+
+        Args:
+            measured: Flight of the MuJoCo plant.
+            predicted: Flight of the reduced plant.
+        """
+        return compare(measured, predicted, self.guarantees)
+
+
+def load_scenario(name: str | Path, settings: tuple[str, ...] = ()) -> Scenario:
+    """Reads a scenario and validates all of it, the parameters of its law included.
+
+    Args:
+        name: Name of a shipped scenario, or path of a TOML file.
+        settings: `key=value` assignments.
+
+    Raises:
+        ValueError: Naming every fault with its path.
+    """
+    path = Path(name)
+    if path.suffix != ".toml":
+        known = library.scenario_names()
+        if str(name) not in known:
+            raise ValueError(choices("scenario", str(name), known, where="the library"))
+        path = library.folder("scenarios") / f"{name}.toml"
+    table = config.override({"name": path.stem, **config.read(path)}, settings)
+    machine = table.get("spacecraft")
+    if isinstance(machine, str) and machine.endswith(".toml"):
+        table["spacecraft"] = str((path.parent / machine).resolve())
+    faults = config.faults(Scenario, table) + _controller_faults(table.get("controller"))
+    if faults:
+        raise ValueError("\n".join([f"{path}:", *faults]))
+    return config.validate(Scenario, table, where=str(path))
+
+
+def assemble(scenario: Scenario) -> Mission:
+    """Builds the plants, designs the law and collects what is guaranteed.
+
+    Args:
+        scenario: The scenario.
+
+    Raises:
+        ValueError: If machine, law and scenario do not fit together; the message says where.
+    """
+    machine = spacecraft.load(scenario.spacecraft).with_parts(
+        scenario.changes("booms"), scenario.changes("thrusters")
+    )
+    disturbance = Disturbance(scenario.disturbance)
+    full = MujocoPhysics.fly(
+        machine, timestep=scenario.simulation.timestep, disturbances=disturbance.names
+    )
+    plant = reduced_plant(scenario, machine, full)
+    thrusters = Thrusters(machine.thrusters)
+    parameters = {key: value for key, value in scenario.controller.items() if key != "law"}
+    law, guarantees = design(scenario.controller["law"])(plant.model, thrusters, **parameters)
+    mission = Mission(
+        scenario=scenario,
+        machine=machine,
+        mujoco=full,
+        reduced=plant,
+        controller=law,
+        guarantees=guarantees + conservation.momentum_balances(plant.model),
+        thrusters=thrusters,
+        disturbance=disturbance,
+    )
+    for name in ("mujoco", "reduced"):
+        mission.environment(name).reset()  # the start and the law's sensors must exist on both
+    return mission
+
+
+def design(law: str) -> Design:
+    """Returns the design function of a law.
+
+    Args:
+        law: Its name in the registry.
+
+    Raises:
+        ValueError: If there is no such law.
+    """
+    if law not in REGISTRY:
+        raise ValueError(choices("law", law, REGISTRY, where="the registry"))
+    return REGISTRY[law]
+
+
+def reduced_plant(
+    scenario: Scenario, machine: Spacecraft, full: MujocoPhysics
+) -> reduced.ReducedPhysics:
+    """Builds the reduced plant with the inputs of the full one.
+
+    Args:
+        scenario: For the source and the number of modes.
+        machine: The spacecraft.
+        full: The full plant.
+
+    Raises:
+        ValueError: If the machine has no such reduced model.
+    """
+    model, modes = full.model.ptr, scenario.reduced.modes
+    linear = linearize.linearize(model)
+    wiring = mjcf.channels(machine, [n for n in full.inputs if n.startswith("disturbance_")])
+    B = linear.B @ [[a in actuators for actuators in wiring.values()] for a in linear.actuators]
+    if scenario.reduced.source == "galerkin":
+        inertia, radius, boom = linearize.planar_bus(model, machine)
+        coefficients = beam.galerkin(
+            bus_inertia=inertia,
+            root_radius=radius,
+            length=boom.length,
+            linear_density=boom.linear_density,
+            bending_stiffness=boom.bending_stiffness,
+            damping_time=boom.damping_time,
+            n_modes=modes,
+        )
+        found = reduced.galerkin_model(
+            coefficients,
+            torques=dict(zip(wiring, B[linear.rigid[-1]].tolist(), strict=True)),
+            tips={boom.name: boom.length for boom in machine.booms},
+        )
+        start = reduced.galerkin_start(modes)
+    else:
+        found = reduced.truncate(
+            M=linear.M, D=linear.D, K=linear.K, B=B, C=linear.C, y0=linear.y0,
+            outputs=linear.outputs, inputs=full.inputs, rigid=linear.rigid, modes=modes,
+        )  # fmt: skip
+
+        start = partial(linearize.initial_state, model, machine)
+
+    return reduced.ReducedPhysics(found, start=start, timestep=scenario.simulation.timestep)
+
+
+def parameters_of(law: Design) -> dict[str, inspect.Parameter]:
+    """Returns the parameters of a design that a scenario sets, by name.
+
+    Args:
+        law: The design function.
+    """
+    found = inspect.signature(law, eval_str=True).parameters
+    return {name: p for name, p in found.items() if p.kind is inspect.Parameter.KEYWORD_ONLY}
+
+
+def _controller_faults(table: Any) -> list[str]:
+    """Faults of a scenario's controller table against the signature of its law's design."""
+    if not isinstance(table, dict):
+        return []  # the scenario's own validation says so
+    law = table.get("law")
+    if law not in REGISTRY:
+        return [f"  controller.law: {choices('law', str(law), REGISTRY, where='the registry')}"]
+    fields: dict[str, Any] = {
+        name: (p.annotation, ... if p.default is p.empty else p.default)
+        for name, p in parameters_of(REGISTRY[law]).items()
+    }
+    model = create_model("controller", __base__=config.Model, law=(str, ...), **fields)
+    return config.faults(model, table, prefix="controller.")

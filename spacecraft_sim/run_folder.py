@@ -1,0 +1,139 @@
+"""The folder that a run leaves: trajectories, verdicts, resolved scenario, picture, recording."""
+
+import json
+import math
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from spacecraft_sim import config
+from spacecraft_sim.compare import Comparison
+from spacecraft_sim.guarantee import Assumption, Verdict
+from spacecraft_sim.mission import Mission
+from spacecraft_sim.scenario import Scenario
+from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.versions import versions
+
+
+def create(path: Path | None, name: str) -> Path:
+    """Makes the folder of a run.
+
+    Args:
+        path: Where; `runs/<name>`, numbered if that is taken, if left out.
+        name: Name of the scenario.
+
+    Raises:
+        ValueError: If the folder exists or cannot be made.
+    """
+    numbered = (Path("runs") / (name if k == 1 else f"{name}-{k}") for k in range(1, 1_000_000))
+    folder = path or next(p for p in numbered if not p.exists())
+    try:
+        folder.mkdir(parents=True)
+    except FileExistsError:
+        raise ValueError(f"--out {folder}: exists already; name a folder that does not") from None
+    except OSError as error:
+        raise ValueError(f"--out {folder}: cannot be written: {error.strerror}") from error
+    return folder
+
+
+def discard(folder: Path) -> None:
+    """Removes the folder of a run that never flew.
+
+    Args:
+        folder: What `create` made.
+    """
+    shutil.rmtree(folder)
+
+
+def write_flights(folder: Path, scenario: Scenario, *flights: Trajectory) -> None:
+    """Writes the resolved scenario and `trajectory.parquet`, and the others by their plant's name.
+
+    Args:
+        folder: The folder of the run.
+        scenario: The scenario that was flown.
+        *flights: The MuJoCo flight first.
+    """
+    (folder / "scenario.toml").write_text(resolved(scenario), encoding="utf-8")
+    for k, flight in enumerate(flights):
+        name = "trajectory" if k == 0 else flight.meta["plant"]
+        flight.save(folder / f"{name}.parquet")
+
+
+def resolved(scenario: Scenario) -> str:
+    """Returns a scenario as TOML, every default spelt out, with the versions in use.
+
+    Args:
+        scenario: The scenario.
+    """
+    table = scenario.model_dump(mode="json", exclude_none=True)
+    table["booms"], table["thrusters"] = scenario.changes("booms"), scenario.changes("thrusters")
+    return config.dumps({**table, "versions": versions()})
+
+
+def write_verdicts(folder: Path, mission: Mission, comparison: Comparison) -> None:
+    """Writes `verdict.json`.
+
+    Args:
+        folder: The folder of the run.
+        mission: What was flown.
+        comparison: How it came out.
+    """
+    table = {
+        "scenario": mission.scenario.name,
+        "holds": all(verdict.holds for verdict in comparison.verdicts),
+        "verdicts": [
+            {**_plain(verdict), "reduced": _number(reduced.measured)}
+            for verdict, reduced in zip(comparison.verdicts, comparison.reduced, strict=True)
+        ],
+        "comparison": [asdict(difference) for difference in comparison.differences],
+        "versions": versions(),
+    }
+    text = json.dumps(table, indent=2, allow_nan=False, ensure_ascii=False)
+    (folder / "verdict.json").write_text(text + "\n", encoding="utf-8")
+
+
+def write_pictures(
+    folder: Path,
+    mission: Mission,
+    measured: Trajectory,
+    predicted: Trajectory,
+    comparison: Comparison,
+) -> None:
+    """Writes `summary.png` and `recording.rrd`.
+
+    Args:
+        folder: The folder of the run.
+        mission: What was flown.
+        measured: Flight of the MuJoCo plant.
+        predicted: Flight of the reduced plant.
+        comparison: How it came out.
+    """
+    from spacecraft_sim import drawing, plots, record
+
+    shown = {
+        "measured": measured,
+        "predicted": predicted,
+        "drawing": drawing.draw(mission.mujoco.model.ptr, mission.machine, measured),
+        "verdicts": comparison.verdicts,
+        "title": mission.scenario.title,
+        "band": mission.scenario.controller.get("accuracy"),
+    }
+    plots.summary(folder / "summary.png", **shown)
+    record.write(folder / "recording.rrd", scenario_toml=resolved(mission.scenario), **shown)
+
+
+def _plain(verdict: Verdict) -> dict[str, Any]:
+    plain = {name: _number(value) for name, value in asdict(verdict).items()}
+    plain["assumptions"] = [_assumption(a) for a in verdict.assumptions]
+    plain["failed"] = [a.text for a in verdict.failed]
+    return plain
+
+
+def _assumption(assumption: Assumption) -> dict[str, Any]:
+    return {**asdict(assumption), "value": _number(assumption.value), "holds": assumption.holds}
+
+
+def _number(value: Any) -> Any:
+    """JSON has no word for what is not finite: null."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
