@@ -7,6 +7,7 @@ from typing import Any
 from spacecraft_sim.config import Model, quantity
 
 _GAUSS = math.sqrt(3) / 6  # the Gauss nodes of [0, 1] are 1/2 -+ this
+_RESOLVED = 0.25  # rad of phase a line may span: its mean is then exact to 0.25^4/4320 = 1e-6
 
 
 class Torque(Model):
@@ -27,11 +28,14 @@ class Disturbance:
 
     Attributes:
         names: Input names `disturbance_<axis>`, in order.
+        longest: Longest interval over which a line stands for the torques, s.
     """
 
     def __init__(self, torques: Mapping[Any, Torque]):
         self.names = tuple(f"disturbance_{axis}" for axis in torques)
         self._torques = tuple(torques.values())
+        fastest = max((abs(t.frequency) for t in self._torques if t.amplitude), default=0.0)
+        self.longest = _RESOLVED / fastest if fastest else math.inf
 
     def value(self, t: float) -> list[float]:
         """Returns the torques at `t`, N m.

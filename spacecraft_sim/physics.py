@@ -2,13 +2,14 @@
 
 A flight is a chain of *smooth pieces*: within a piece every input is a straight line in time.
 `begin` opens a piece at the present instant, `advance(t)` carries the plant from there to t; called
-again, it starts again from the opening, which is how a switching instant is located.  Each piece is
-one RK4 step, so thrust edges fall on step ends and the order 4 survives them.
+again, it starts again from the opening, which is how a switching instant is located.  A piece is a
+whole number of equal RK4 steps, so thrust edges fall on step ends and the order 4 survives them.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportMissingImports=false
 # (MuJoCo is a compiled module without type stubs)
 
+import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 
@@ -81,6 +82,7 @@ class MujocoPhysics(dm_mujoco.Physics):
         self._wiring = sorted(wiring.items())
         self._pointers, self._option = (model, data), model.opt
         self._act, self._ctrl = data.act, data.ctrl
+        self._qpos, self._qvel = data.qpos, data.qvel
         self._opened = np.zeros(mujoco.mj_stateSize(model, _STATE))
         self._moved = False
         self._acceleration_sensors = bool(
@@ -106,7 +108,7 @@ class MujocoPhysics(dm_mujoco.Physics):
 
     def coordinates(self) -> list[float]:
         """Returns the generalised coordinates, shape (nq,)."""
-        return self.data.ptr.qpos.tolist()
+        return self._qpos.tolist()
 
     def coordinate_units(self) -> dict[str, str]:
         """Returns the names of the generalised coordinates, with their units."""
@@ -148,12 +150,11 @@ class MujocoPhysics(dm_mujoco.Physics):
             self._value, self._slope = value, slope
             for k, i in self._wiring:
                 self._act[k], self._ctrl[k] = value[i], slope[i]
-        mujoco.mj_forwardSkip(model, data, _VELOCITY_STAGE, 1)
         mujoco.mj_getState(model, data, self._opened, _STATE)
-        self._moved = False
+        self._opening, self._moved = data.time, False
 
     def advance(self, t: float) -> None:
-        """Carries the plant from the opening of the piece to `t` by one RK4 step.
+        """Carries the plant from the opening of the piece to `t` by equal RK4 steps.
 
         Args:
             t: End time, s.
@@ -161,15 +162,22 @@ class MujocoPhysics(dm_mujoco.Physics):
         model, data = self._pointers
         if self._moved:
             mujoco.mj_setState(model, data, self._opened, _STATE)
-            mujoco.mj_forward(model, data)
+            mujoco.mj_step1(model, data)
         self._moved = True
-        self._option.timestep = t - data.time
+        span = t - self._opening
+        # The small allowance keeps rounding of the clock from adding a step.
+        steps = math.ceil(span / self._timestep - 1e-9) or 1
+        self._option.timestep = span / steps
+        # What depends on position and velocity is up to date: the first step need not repeat it.
+        mujoco.mj_forwardSkip(model, data, _VELOCITY_STAGE, 1)
         mujoco.mj_RungeKutta(model, data, 4)
+        if steps > 1:
+            mujoco.mj_step(model, data, steps - 1)
         self._option.timestep = self._timestep
         data.time = t
         mujoco.mj_step1(model, data)
         if self._acceleration_sensors:
-            mujoco.mj_forwardSkip(model, data, _VELOCITY_STAGE, 0)
+            mujoco.mj_forward(model, data)
 
     def step(self, nstep: int = 1) -> None:
         """Advances by `nstep` whole steps with the inputs held.
@@ -180,10 +188,8 @@ class MujocoPhysics(dm_mujoco.Physics):
         Raises:
             PhysicsError: If the state is no longer finite.
         """
-        for _ in range(nstep):
-            time = self.time()
-            self.begin(self._held, [0.0] * len(self.inputs))
-            self.advance(time + self._timestep)
+        self.begin(self._held, [0.0] * len(self.inputs))
+        self.advance(self.time() + nstep * self._timestep)
         self.check_divergence()
 
     def set_control(self, control: Sequence[float]) -> None:
@@ -209,15 +215,15 @@ class MujocoPhysics(dm_mujoco.Physics):
         Raises:
             PhysicsError: Saying when it was found not to be.
         """
-        data = self.data.ptr
-        total = float(data.qvel.sum() + data.qpos.sum())
-        if not abs(total) < 1e10:  # also true for NaN
+        size = float(self._qvel.dot(self._qvel) + self._qpos.dot(self._qpos))
+        if not size < _HUGE**2:  # also true for NaN
             raise control.PhysicsError(
-                f"the MuJoCo plant diverged before t = {data.time:.6g} s: a coordinate or velocity "
-                "is not finite or beyond 1e10; look at the last rows of the trajectory"
+                f"the MuJoCo plant diverged before t = {self.time():.6g} s: its coordinates or "
+                f"velocities are not finite or beyond {_HUGE:g}"
             )
 
 
+_HUGE = 1e6  # rad, m, rad/s, m/s: no spacecraft gets there
 _VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 _STATE = int(mujoco.mjtState.mjSTATE_PHYSICS | mujoco.mjtState.mjSTATE_TIME)
 

@@ -16,7 +16,8 @@ turn:
 # (MuJoCo is a compiled module without type stubs)
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -25,7 +26,6 @@ from spacecraft_sim.checks import choices
 from spacecraft_sim.mjcf import AXES, BUS
 
 Array = np.ndarray
-Getter = Callable[[], float]
 
 _S = mujoco.mjtSensor
 _UNITS = {
@@ -50,6 +50,19 @@ _UNITS = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Readings that are computed together.
+
+    Attributes:
+        units: Their names and SI units.
+        read: Gives their values from the data as it then is.
+    """
+
+    units: dict[str, str]
+    read: Callable[[], list[float]]
+
+
 class Readings:
     """The readings of one model and its data.
 
@@ -58,13 +71,12 @@ class Readings:
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData):
-
+        self._blocks = [*_sensors(model, data), *_quasi_rigid(model, data)]
         self.units: dict[str, str] = {}
-        self._getters: dict[str, Getter] = {}
-        for i in range(model.nsensor):
-            self._add_sensor(model, data, i)
-        for name, unit, getter in _quasi_rigid(model, data):
-            self._add(name, unit, getter)
+        for block in self._blocks:
+            if twice := self.units.keys() & block.units.keys():
+                raise ValueError(f"two sensors give the readings {sorted(twice)}; rename one")
+            self.units |= block.units
 
     def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]:
         """Returns a function that reads the named readings from the data as it then is.
@@ -76,32 +88,44 @@ class Readings:
             ValueError: If a name does not exist; the message lists those that do.
         """
         for name in names:
-            if name not in self._getters:
-                raise ValueError(choices("sensor", name, self._getters, where="the model"))
-        getters = [self._getters[name] for name in names]
-        return lambda: [getter() for getter in getters]
+            if name not in self.units:
+                raise ValueError(choices("sensor", name, self.units, where="the model"))
+        used = [block for block in self._blocks if block.units.keys() & set(names)]
+        order = [name for block in used for name in block.units]
+        reads, picks = [block.read for block in used], [order.index(name) for name in names]
+        if picks == list(range(len(order))):
+            return lambda: [value for read in reads for value in read()]
 
-    def _add(self, name: str, unit: str, getter: Getter) -> None:
-        if name in self.units:
-            raise ValueError(f"two sensors give the reading {name!r}; rename one")
-        self.units[name], self._getters[name] = unit, getter
+        def selected() -> list[float]:
+            values = [value for read in reads for value in read()]
+            return [values[k] for k in picks]
 
-    def _add_sensor(self, model: mujoco.MjModel, data: mujoco.MjData, i: int) -> None:
+        return selected
+
+
+def _sensors(model: mujoco.MjModel, data: mujoco.MjData) -> list[Block]:
+    """One block a sensor, but all scalars and vectors that stand next to each other in one."""
+    blocks: list[Block] = []
+    units, start = {}, 0
+    for i in range(model.nsensor):
         name, kind = model.sensor(i).name, _S(model.sensor_type[i])
-        start, size = int(model.sensor_adr[i]), int(model.sensor_dim[i])
-        values = data.sensordata[start : start + size]
+        first, size = int(model.sensor_adr[i]), int(model.sensor_dim[i])
         unit = _UNITS.get(kind, "")
         if kind in (_S.mjSENS_JOINTPOS, _S.mjSENS_JOINTVEL) and _slides(model, i):
             unit = unit.replace("rad", "m")
         if kind in (_S.mjSENS_FRAMEQUAT, _S.mjSENS_BALLQUAT):
-            for k, axis in enumerate(AXES):
-                self._add(f"{name}_{axis}", unit, _rotation_component(values, k))
-        elif size == 1:
-            self._add(name, unit, lambda: values.item(0))
+            blocks += _plain(units, data.sensordata[start:first])
+            rotation = _rotation_vector(data.sensordata[first : first + size])
+            blocks.append(Block({f"{name}_{axis}": unit for axis in AXES}, rotation))
+            units, start = {}, first + size
         else:
-            suffixes = AXES if size == 3 else tuple(map(str, range(size)))
-            for k, suffix in enumerate(suffixes):
-                self._add(f"{name}_{suffix}", unit, lambda k=k: values.item(k))
+            suffixes = {1: ("",), 3: ("_x", "_y", "_z")}.get(size) or [f"_{k}" for k in range(size)]
+            units |= {f"{name}{suffix}": unit for suffix in suffixes}
+    return blocks + _plain(units, data.sensordata[start:])
+
+
+def _plain(units: dict[str, str], values: Array) -> list[Block]:
+    return [Block(units, values.tolist)] if units else []
 
 
 def _slides(model: mujoco.MjModel, sensor: int) -> bool:
@@ -109,79 +133,68 @@ def _slides(model: mujoco.MjModel, sensor: int) -> bool:
     return model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
 
 
-def _rotation_component(quaternion: Array, k: int) -> Getter:
-    """Component k of the rotation vector of a unit quaternion (w, x, y, z), shortest way round."""
+def _rotation_vector(quaternion: Array) -> Callable[[], list[float]]:
+    """The rotation vector of a unit quaternion (w, x, y, z), the shortest way round."""
 
-    def getter() -> float:
+    def read() -> list[float]:
         w, x, y, z = quaternion.tolist()
         sine = math.sqrt(x * x + y * y + z * z)
-        angle = 2 * math.atan2(sine, abs(w))
-        scale = angle / sine if sine > 1e-12 else 2.0
-        return math.copysign(scale, w) * (x, y, z)[k]
+        scale = 2 * math.atan2(sine, abs(w)) / sine if sine > 1e-12 else 2.0
+        scale = math.copysign(scale, w)
+        return [scale * x, scale * y, scale * z]
 
-    return getter
+    return read
 
 
-def _quasi_rigid(model: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[str, str, Getter]]:
+def _quasi_rigid(model: mujoco.MjModel, data: mujoco.MjData) -> list[Block]:
     """Readings of the momentum and of the rigid coordinates, if the bus turns on one joint."""
     bus = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, BUS)
     if bus < 0 or model.body_jntnum[bus] != 1:
         return []
     joint = int(model.body_jntadr[bus])
-    kind = model.jnt_type[joint]
-    if kind == mujoco.mjtJoint.mjJNT_HINGE:
-        k = int(np.argmax(np.abs(model.jnt_axis[joint])))
-        if model.jnt_axis[joint][k] == 1.0:
-            return _about_hinge(model, data, int(model.jnt_dofadr[joint]), AXES[k])
+    dof = int(model.jnt_dofadr[joint])
+    kind, axis = model.jnt_type[joint], model.jnt_axis[joint]
+    if kind == mujoco.mjtJoint.mjJNT_HINGE and np.max(axis) == 1.0:
+        return [_about_hinge(model, data, dof, AXES[int(np.argmax(axis))])]
     if kind == mujoco.mjtJoint.mjJNT_FREE:
-        return _about_centre_of_mass(model, data, bus, int(model.jnt_dofadr[joint]))
+        return [_about_centre_of_mass(model, data, bus, dof)]
     return []
 
 
-def _about_hinge(
-    model: mujoco.MjModel, data: mujoco.MjData, dof: int, axis: str
-) -> list[tuple[str, str, Getter]]:
+def _units(axes: Sequence[str]) -> dict[str, str]:
+    kinds = {"angular_momentum": "N m s", "quasi_rigid_angle": "rad", "quasi_rigid_rate": "rad/s"}
+    return {f"{kind}_{axis}": unit for kind, unit in kinds.items() for axis in axes}
+
+
+def _about_hinge(model: mujoco.MjModel, data: mujoco.MjData, dof: int, axis: str) -> Block:
     M = undeformed_mass_matrix(model)
     J = float(M[dof, dof])
-    momenta, qvel = np.zeros(model.nv), data.qvel
+    difference = _tangent(model, data)
+    row, momenta, qvel = M[dof] / J, np.zeros(model.nv), data.qvel
 
-    def momentum() -> float:
+    def read() -> list[float]:
         mujoco.mj_mulM(model, data, momenta, qvel)
-        return momenta.item(dof)
+        momentum = momenta.item(dof)
+        return [momentum, float(row.dot(difference())), momentum / J]
 
-    return [
-        (f"angular_momentum_{axis}", "N m s", momentum),
-        (f"quasi_rigid_angle_{axis}", "rad", _along(model, data, M[dof] / J)),
-        (f"quasi_rigid_rate_{axis}", "rad/s", lambda: momentum() / J),
-    ]
+    return Block(_units(axis), read)
 
 
-def _about_centre_of_mass(
-    model: mujoco.MjModel, data: mujoco.MjData, bus: int, dof: int
-) -> list[tuple[str, str, Getter]]:
+def _about_centre_of_mass(model: mujoco.MjModel, data: mujoco.MjData, bus: int, dof: int) -> Block:
     M = undeformed_mass_matrix(model)
     base = slice(dof, dof + 6)
     inverse = np.linalg.inv(M[base, base])
     rows = (inverse @ M[base])[3:]  # (3, nv): rotation of the bus plus G^T q of the flexible joints
     inverse_inertia = inverse[3:, 3:]
-    momentum, rotation = data.subtree_angmom[bus], data.xmat[bus]
+    difference = _tangent(model, data)
+    momentum, rotation = data.subtree_angmom[bus], data.xmat[bus].reshape(3, 3)
 
-    def world(k: int) -> float:
+    def read() -> list[float]:
         mujoco.mj_subtreeVel(model, data)
-        return float(momentum[k])
+        rate = inverse_inertia @ (momentum @ rotation)
+        return [*momentum.tolist(), *(rows @ difference()).tolist(), *rate.tolist()]
 
-    def rate(k: int) -> float:
-        mujoco.mj_subtreeVel(model, data)
-        return float(inverse_inertia[k] @ (momentum @ rotation.reshape(3, 3)))
-
-    readings: list[tuple[str, str, Getter]] = []
-    for k, axis in enumerate(AXES):
-        readings += [
-            (f"angular_momentum_{axis}", "N m s", lambda k=k: world(k)),
-            (f"quasi_rigid_angle_{axis}", "rad", _along(model, data, rows[k])),
-            (f"quasi_rigid_rate_{axis}", "rad/s", lambda k=k: rate(k)),
-        ]
-    return readings
+    return Block(_units(AXES), read)
 
 
 def undeformed_mass_matrix(model: mujoco.MjModel) -> Array:
@@ -197,16 +210,15 @@ def undeformed_mass_matrix(model: mujoco.MjModel) -> Array:
     return M
 
 
-def _along(model: mujoco.MjModel, data: mujoco.MjData, row: Array) -> Getter:
-    """Returns a function that gives row . (qpos - qpos0), the difference in the tangent space."""
-    qpos = data.qpos
+def _tangent(model: mujoco.MjModel, data: mujoco.MjData) -> Callable[[], Array]:
+    """Returns a function that gives qpos - qpos0 in the tangent space, shape (nv,)."""
+    qpos, reference = data.qpos, model.qpos0.copy()
     if model.nq == model.nv:
-        offset = float(row @ model.qpos0)
-        return lambda: float(row.dot(qpos)) - offset
-    reference, difference = model.qpos0.copy(), np.zeros(model.nv)
+        return (lambda: qpos - reference) if reference.any() else lambda: qpos
+    difference = np.zeros(model.nv)
 
-    def getter() -> float:
+    def tangent() -> Array:
         mujoco.mj_differentiatePos(model, difference, 1.0, reference, qpos)
-        return float(row.dot(difference))
+        return difference
 
-    return getter
+    return tangent

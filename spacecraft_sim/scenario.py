@@ -25,8 +25,8 @@ class Initial(Model):
 class Simulation(Model):
     """How the MuJoCo plant is integrated."""
 
-    timestep: float = quantity("longest RK4 step; edges are landed on", "s", 0.02, gt=0)
-    substeps: int = quantity("steps to a control step, at which rows are recorded", "", 5, ge=1)
+    timestep: float = quantity("longest RK4 step; edges are landed on", "s", 0.01, gt=0)
+    substeps: int = quantity("steps to a control step, at which rows are recorded", "", 10, ge=1)
 
 
 class Reduced(Model):

@@ -1,7 +1,6 @@
 """The task of a flight: measure -> controller -> thrusters -> plant, on either plant."""
 
 import math
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -102,13 +101,13 @@ class ControlTask(control.Task):
         highest = np.array([max(spec.levels) for spec in self._thrusters.specs])
         return specs.BoundedArray(highest.shape, float, -highest, highest, name="extra_command")
 
-    def get_observation(self, physics: Plant) -> OrderedDict[str, np.ndarray]:
+    def get_observation(self, physics: Plant) -> dict[str, np.ndarray]:
         """Returns every reading by name.
 
         Args:
             physics: The plant.
         """
-        return OrderedDict(zip(physics.units, np.array(self._read()), strict=True))
+        return dict(zip(physics.units, np.array(self._read()), strict=True))
 
     def get_reward(self, physics: Plant) -> float:
         """Returns 1/(1 + (angle/accuracy)^2).
@@ -124,40 +123,36 @@ class ControlTask(control.Task):
     def fly(self, physics: Plant, end: float) -> None:
         """Carries the plant to `end` through smooth pieces.
 
-        A piece ends at the next whole step, thrust edge, sample or control step; a law in
-        continuous time ends it earlier, at the instant at which its command changes.
+        A piece ends at the next thrust edge, sample or control step; a law in continuous time ends
+        it earlier, at the instant at which its command changes.
 
         Args:
             physics: The plant.
             end: Time to reach, s.
         """
-        thrusters, disturbance, period = self._thrusters, self._disturbance, self._controller.period
-        longest, t = physics.timestep(), physics.time()
-        thrust, slope = thrusters.output(t, self._state)
-        edge = thrusters.next_edge(t, self._state)
+        disturbance, period = self._disturbance, self._controller.period
+        t = physics.time()
         while t < end:
-            # Equal steps to the end; the small allowance keeps rounding from adding one more.
-            steps = math.ceil((end - t) / longest - 1e-9)
             sample = math.inf if period is None else self._samples * period
-            stop = min(end if steps == 1 else t + (end - t) / steps, edge, sample)
+            limits = end, self._edge, sample, t + disturbance.longest, _foreseen(self._trace)
+            stop = min(limits)
             torque, rate = disturbance.line(t, stop)
-            value, rates = thrust + torque, slope + rate
+            value, rates = self._thrust + torque, self._slope + rate
             physics.begin(value, rates)
             physics.advance(stop)
             decided = stop == sample
             if period is None:
                 stop, decided = self._switching(physics, stop)
-            self._accumulate(value, rates, stop - t)
-            t = stop
+            if self.recorder:
+                self._accumulate(value, rates, stop - t)
+            t, landed = stop, stop == self._edge
             if decided:
                 self._decide(t)
-            if decided or t == edge:
+            elif landed or any(self._slope):
+                self._follow_thrust(t)
+            if decided or landed:
                 self._trace = self._trace[-1:]
-                thrust, slope = thrusters.output(t, self._state)
-                edge = thrusters.next_edge(t, self._state)
                 self._record(physics)
-            elif any(slope):
-                thrust, slope = thrusters.output(t, self._state)
         self._record(physics)
 
     def _switching(self, physics: Plant, stop: float) -> tuple[float, bool]:
@@ -171,15 +166,16 @@ class ControlTask(control.Task):
             physics.advance(t)
             return self._least_event(t)
 
-        before, here = self._trace[-1], (stop, self._least_event(stop))
-        if here[1] > 0 and (dip := _suspected_dip(*self._trace, here)):
-            inside = dip, carried_to(dip)
-            here = inside if inside[1] <= 0 else (stop, carried_to(stop))
-        if here[1] <= 0:
-            here = _first_not_positive(carried_to, before, here)
-            physics.advance(here[0])
-        self._trace = [before, here]
-        return here[0], here[1] <= 0
+        points = [*self._trace, (stop, self._least_event(stop))]
+        if points[-1][1] > 0 and (dip := _suspected_dip(points)) is not None:
+            inside = (dip, carried_to(dip))
+            points[-1] = inside if inside[1] <= 0 else (stop, carried_to(stop))
+        if points[-1][1] <= 0:
+            points.append(_first_not_positive(carried_to, points))
+            if physics.time() != points[-1][0]:
+                physics.advance(points[-1][0])
+        self._trace = points[-3:]
+        return points[-1][0], points[-1][1] <= 0
 
     def _least_event(self, t: float) -> float:
         return min(self._controller.events(t, self._measure(), self._memory), default=1.0)
@@ -196,6 +192,12 @@ class ControlTask(control.Task):
     def _issue(self, t: float) -> None:
         total = [c + e for c, e in zip(self._command, self._extra, strict=True)]
         self._state = self._thrusters.command(t, total, self._state)
+        self._follow_thrust(t)
+
+    def _follow_thrust(self, t: float) -> None:
+        """Takes thrust and slope just after `t`, and the next edge, from the thrusters."""
+        self._thrust, self._slope = self._thrusters.output(t, self._state)
+        self._edge = self._thrusters.next_edge(t, self._state)
 
     # -- the record ------------------------------------------------------------------------------
 
@@ -222,10 +224,9 @@ class ControlTask(control.Task):
         if self.recorder is None:
             return
         t = physics.time()
-        thrust, _ = self._thrusters.output(t, self._state)
         self.recorder.add(
             [
-                *(t, *self._read(), *thrust, *self._disturbance.value(t)),
+                *(t, *self._read(), *self._thrust, *self._disturbance.value(t)),
                 *(*self._command, *self._impulse, *self._spent, *physics.coordinates()),
             ]
         )
@@ -241,17 +242,32 @@ class ControlTask(control.Task):
 
 
 Point = tuple[float, float]  # time, least event function
+WIDTH = 1e-11  # to which a switching instant is located, s
 
 
-def _suspected_dip(earlier: Point, before: Point, here: Point | None = None) -> float | None:
-    """Where a parabola through three points dips between the last two, if it may reach zero there.
+def _foreseen(points: Sequence[Point]) -> float:
+    """When the event function will cross zero, extrapolated from its last three points; inf if not.
+
+    Cutting the piece there spares most of the repetitions that `_first_not_positive` would need.
+    The first cut falls just short of the crossing, the next one just behind it.
+    """
+    if len(points) < 3:
+        return math.inf
+    before, last = points[-2:]
+    ahead = _root_of_parabola(last, before, points[-3])
+    near = ahead < 0.05 * (last[0] - before[0])
+    return last[0] + (ahead + WIDTH / 2 if near else (1 - 1e-4) * ahead)
+
+
+def _suspected_dip(points: Sequence[Point]) -> float | None:
+    """Where a parabola through the last three points dips between the last two, if it may cross 0.
 
     While the function curves upwards its slope over the last piece was steeper than it is now: only
     if that slope leads below zero can there be a pair of zeros between two positive ends.
     """
-    if here is None:
+    if len(points) < 3:
         return None
-    (t0, f0), (t1, f1), (t2, f2) = earlier, before, here
+    (t0, f0), (t1, f1), (t2, f2) = points[-3:]
     slope = (f1 - f0) / (t1 - t0)
     if slope >= 0 or f1 + slope * (t2 - t1) > 0:
         return None
@@ -260,37 +276,44 @@ def _suspected_dip(earlier: Point, before: Point, here: Point | None = None) -> 
     return dip if t1 < dip < t2 else None
 
 
-def _first_not_positive(function: Callable[[float], float], a: Point, b: Point) -> Point:
-    """Narrows a sign change to the width of the clock's last bits.
-
-    Illinois steps, kept inside the bracket, with a bisection every eighth.
+def _first_not_positive(function: Callable[[float], float], points: Sequence[Point]) -> Point:
+    """Narrows a sign change to the last bits of the clock, from the side that is not positive.
 
     Args:
         function: The event function.
-        a: Left end, where it is positive.
-        b: Right end, where it is not.
+        points: The last two bracket the sign change; an earlier one, if any, shows the curvature.
 
     Returns:
-        The right end of the final bracket.
+        A point within `WIDTH` after the sign change.
     """
-    (ta, fa), (tb, fb) = a, b
-    width = max(1e-12, 4 * math.ulp(tb))
-    weight_a = weight_b = 1.0  # Illinois: an end that is kept twice in a row counts half
-    replaced = ""
-    for k in range(200):
-        if tb - ta <= width or fb == 0:
+    *earlier, a, b = points
+    third = earlier[-1] if earlier else None
+    width = max(WIDTH, 4 * math.ulp(b[0]))
+    for k in range(100):
+        span = b[0] - a[0]
+        if span <= width or -b[1] <= width * (a[1] - b[1]) / span:
             break
-        left, right = weight_a * fa, weight_b * fb
-        t = (ta + tb) / 2 if k % 8 == 7 else tb - right * (tb - ta) / (right - left)
-        t = min(max(t, ta + width / 2), tb - width / 2)
-        f = function(t)
-        if f > 0:
-            weight_a, weight_b = 1.0, weight_b / 2 if replaced == "a" else 1.0
-            ta, fa, replaced = t, f, "a"
+        step = span / 2 if k % 5 == 4 else _root_of_parabola(a, b, third)
+        t = a[0] + min(max(step + width / 2, width / 2), span - width / 2)
+        point = (t, function(t))
+        if point[1] > 0:
+            a, third = point, a
         else:
-            weight_b, weight_a = 1.0, weight_a / 2 if replaced == "b" else 1.0
-            tb, fb, replaced = t, f, "b"
-    return tb, fb
+            b, third = point, b
+    return b
+
+
+def _root_of_parabola(a: Point, b: Point, third: Point | None) -> float:
+    """How far after a the parabola, or chord, through the points first falls to zero; or inf."""
+    (ta, fa), (tb, fb) = a, b
+    slope, curvature = (fb - fa) / (tb - ta), 0.0
+    if third is not None:
+        curvature = ((third[1] - fb) / (third[0] - tb) - slope) / (third[0] - ta)
+    slope -= curvature * (tb - ta)  # at a
+    discriminant = slope * slope - 4 * curvature * fa
+    if discriminant < 0 or (fall := math.sqrt(discriminant) - slope) <= 0:
+        return math.inf
+    return 2 * fa / fall
 
 
 def _scattered(initial: Initial, random: np.random.Generator) -> Initial:

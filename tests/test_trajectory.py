@@ -1,0 +1,127 @@
+"""Recordings: nothing is lost in the file, and peaks are found between the samples."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from spacecraft_sim.trajectory import Recorder, Trajectory, peak
+
+NUMBERS = st.floats(width=64)  # NaN, infinities and minus zero too
+
+
+def flight(time, **signals):
+    return Trajectory(
+        time=np.asarray(time, dtype=float),
+        signals={name: np.asarray(values, dtype=float) for name, values in signals.items()},
+        units=dict.fromkeys(signals, "rad"),
+        meta={"plant": "mujoco", "scenario": {"duration": 1.5, "booms": ["left"]}},
+    )
+
+
+def hermite(coefficients, time):
+    cubic = np.polynomial.Polynomial(coefficients)
+    return time, cubic(time), cubic.deriv()(time)
+
+
+@given(table=arrays.arrays(np.float64, st.tuples(st.just(3), st.integers(0, 40)), elements=NUMBERS))
+def test_flight_survives_the_file_bit_for_bit(table, tmp_path_factory):
+    path = tmp_path_factory.mktemp("flight") / "flight.parquet"
+    saved = flight(table[0], angle=table[1], rate=table[2])
+    saved.save(path)
+    loaded = Trajectory.load(path)
+    assert loaded.time.tobytes() == saved.time.tobytes()
+    assert list(loaded.signals) == ["angle", "rate"]
+    for name, values in saved.signals.items():
+        assert loaded[name].dtype == np.float64
+        assert loaded[name].tobytes() == values.tobytes()
+    assert loaded.units == saved.units
+    assert loaded.meta == saved.meta
+
+
+def test_file_says_the_unit_of_each_column(tmp_path):
+    import pyarrow.parquet as pq
+
+    flight([0.0], angle=[1.0]).save(tmp_path / "flight.parquet")
+    schema = pq.read_schema(tmp_path / "flight.parquet")
+    assert schema.field("time").metadata == {b"unit": b"s"}
+    assert schema.field("angle").metadata == {b"unit": b"rad"}
+
+
+def test_other_parquet_file_is_refused_by_its_path(tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table({"time": [0.0]}), tmp_path / "other.parquet")
+    with pytest.raises(ValueError, match=r"other\.parquet: not a trajectory"):
+        Trajectory.load(tmp_path / "other.parquet")
+
+
+def test_file_that_is_not_parquet_is_refused_by_its_path(tmp_path):
+    (tmp_path / "other.parquet").write_bytes(b"not parquet at all")
+    with pytest.raises(ValueError, match=r"other\.parquet"):
+        Trajectory.load(tmp_path / "other.parquet")
+
+
+def test_missing_signal_is_refused_with_those_there_are():
+    with pytest.raises(KeyError, match="signal 'yaw' is not recorded; there are: angle, rate"):
+        flight([0.0], angle=[1.0], rate=[2.0])["yaw"]
+
+
+def test_recorder_keeps_rows_in_order_and_the_last_of_an_instant():
+    recorder = Recorder({"angle": "rad"})
+    for row in ([0.0, 1.0], [0.5, 2.0], [0.5, 3.0], [1.0, 4.0]):
+        recorder.add(row)
+    recorded = recorder.trajectory({"plant": "reduced"})
+    assert recorded.time.tolist() == [0.0, 0.5, 1.0]
+    assert recorded["angle"].tolist() == [1.0, 3.0, 4.0]
+    assert recorded.meta == {"plant": "reduced"}
+
+
+def test_recorded_arrays_are_read_only():
+    recorder = Recorder({"angle": "rad"})
+    recorder.add([0.0, 1.0])
+    recorded = recorder.trajectory({})
+    for array in (recorded.time, recorded["angle"]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 2.0
+
+
+def test_flight_without_rows_has_its_signals():
+    recorded = Recorder({"angle": "rad"}).trajectory({})
+    assert len(recorded.time) == len(recorded["angle"]) == 0
+
+
+def test_peak_of_a_parabola_between_two_samples_is_its_vertex():
+    value, time = peak(*hermite([0.0, 1.0, -0.5], np.array([0.0, 3.0])))  # t - t^2/2
+    assert value == pytest.approx(1.5, rel=1e-15)  # at the end: -1.5 beats 0.5 at the vertex
+    assert time == 3.0
+    value, time = peak(*hermite([0.0, 1.0, -0.5], np.array([0.0, 1.75])))
+    assert (value, time) == pytest.approx((0.5, 1.0), rel=1e-15)  # rounding
+
+
+@given(
+    coefficients=st.lists(
+        st.just(0.0) | st.floats(1e-6, 5) | st.floats(-5, -1e-6), min_size=4, max_size=4
+    ),
+    inner=st.lists(st.floats(0.05, 3.95), max_size=4, unique=True),
+)
+def test_peak_of_a_cubic_is_found_exactly_wherever_it_is_sampled(coefficients, inner):
+    cubic = np.polynomial.Polynomial(coefficients)
+    stationary = [t.real for t in cubic.deriv().roots() if abs(t.imag) < 1e-12]
+    extrema = [0.0, 4.0, *(t for t in stationary if 0 < t < 4)]
+    largest = max(abs(cubic(t)) for t in extrema)
+    value, time = peak(*hermite(coefficients, np.array([0.0, *sorted(inner), 4.0])))
+    # Rounding: terms up to 5 * 4^3, divided by the shortest interval in the rates.
+    assert value == pytest.approx(largest, rel=1e-12, abs=1e-11)
+    assert abs(cubic(time)) == pytest.approx(largest, rel=1e-12, abs=1e-11)
+
+
+def test_peak_of_samples_alone_is_the_largest():
+    assert peak(np.array([2.0]), np.array([-3.0]), np.array([1.0])) == (3.0, 2.0)
+
+
+def test_peak_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="no samples"):
+        peak(np.array([]), np.array([]), np.array([]))
