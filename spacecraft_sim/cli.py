@@ -101,12 +101,14 @@ def _list(_: argparse.Namespace) -> int:
 
 def _explain(arguments: argparse.Namespace) -> int:
     mission = _assemble(arguments)
+    from controllers import REGISTRY
     from spacecraft_sim import explain
 
     console = _console()
     scenario = mission.scenario
     console.print(f"[bold]{scenario.name}[/]: {scenario.title}\n\n{scenario.description.strip()}\n")
-    for heading, rows in explain.parameters(scenario, mission.machine):
+    law = REGISTRY[scenario.controller["law"]]
+    for heading, rows in explain.parameters(scenario, mission.machine, law):
         table = Table("parameter", "value", "default", "unit", "what", title=heading, box=None)
         _fill(table, rows)
         console.print(table)

@@ -2,7 +2,7 @@
 
 import inspect
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from pydantic import BaseModel
@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 
 from spacecraft_sim.config import unit_of
 from spacecraft_sim.guarantee import Guarantee
-from spacecraft_sim.mission import design, parameters_of
+from spacecraft_sim.mission import parameters_of
 from spacecraft_sim.scenario import Scenario
 from spacecraft_sim.spacecraft import Spacecraft
 
@@ -19,18 +19,20 @@ Row = tuple[str, ...]
 _UNITS = re.compile(r",\s*((?:rad|kg|N|m|s|1/s)(?:[ /^*a-z0-9N]*)?)(?:;|\.|$)")
 
 
-def parameters(scenario: Scenario, machine: Spacecraft) -> list[tuple[str, list[Row]]]:
+def parameters(
+    scenario: Scenario, machine: Spacecraft, design: Callable
+) -> list[tuple[str, list[Row]]]:
     """Returns (heading, rows of name, value, default, unit, description) for every parameter.
 
     Args:
         scenario: The scenario.
         machine: Its spacecraft.
+        design: The design function of its law.
     """
-    law = scenario.controller["law"]
     return [
         ("scenario", list(_fields(scenario, ""))),
         (f"spacecraft {machine.name}", list(_fields(machine, ""))),
-        (f"law {law}", list(_law(law, scenario.controller))),
+        (f"law {scenario.controller['law']}", list(_law(design, scenario.controller))),
     ]
 
 
@@ -92,9 +94,9 @@ def _default(field: FieldInfo) -> str:
     return "required" if field.is_required() else str(field.get_default(call_default_factory=True))
 
 
-def _law(law: str, chosen: dict[str, Any]) -> Iterator[Row]:
-    texts = _argument_texts(inspect.getdoc(design(law)) or "")
-    for name, parameter in parameters_of(design(law)).items():
+def _law(design: Callable, chosen: dict[str, Any]) -> Iterator[Row]:
+    texts = _argument_texts(inspect.getdoc(design) or "")
+    for name, parameter in parameters_of(design).items():
         default = "required" if parameter.default is parameter.empty else str(parameter.default)
         text = texts.get(name, "")
         unit = _UNITS.search(text)

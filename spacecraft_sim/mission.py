@@ -4,7 +4,7 @@ Beside the command line this is the only module that knows the controllers.
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -103,12 +103,15 @@ class Mission:
         return compare(measured, predicted, self.guarantees)
 
 
-def load_scenario(name: str | Path, settings: tuple[str, ...] = ()) -> Scenario:
+def load_scenario(
+    name: str | Path, settings: tuple[str, ...] = (), laws: Mapping[str, Design] = REGISTRY
+) -> Scenario:
     """Reads a scenario and validates all of it, the parameters of its law included.
 
     Args:
         name: Name of a shipped scenario, or path of a TOML file.
         settings: `key=value` assignments.
+        laws: Designs by name.
 
     Raises:
         ValueError: Naming every fault with its path.
@@ -123,17 +126,18 @@ def load_scenario(name: str | Path, settings: tuple[str, ...] = ()) -> Scenario:
     machine = table.get("spacecraft")
     if isinstance(machine, str) and machine.endswith(".toml"):
         table["spacecraft"] = str((path.parent / machine).resolve())
-    faults = config.faults(Scenario, table) + _controller_faults(table.get("controller"))
+    faults = config.faults(Scenario, table) + _controller_faults(table.get("controller"), laws)
     if faults:
         raise ValueError("\n".join([f"{path}:", *faults]))
     return config.validate(Scenario, table, where=str(path))
 
 
-def assemble(scenario: Scenario) -> Mission:
+def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Mission:
     """Builds the plants, designs the law and collects what is guaranteed.
 
     Args:
         scenario: The scenario.
+        laws: Designs by name.
 
     Raises:
         ValueError: If machine, law and scenario do not fit together; the message says where.
@@ -148,7 +152,8 @@ def assemble(scenario: Scenario) -> Mission:
     plant = reduced_plant(scenario, machine, full)
     thrusters = Thrusters(machine.thrusters)
     parameters = {key: value for key, value in scenario.controller.items() if key != "law"}
-    law, guarantees = design(scenario.controller["law"])(plant.model, thrusters, **parameters)
+    design = laws[scenario.controller["law"]]
+    law, guarantees = design(plant.model, thrusters, **parameters)
     mission = Mission(
         scenario=scenario,
         machine=machine,
@@ -162,20 +167,6 @@ def assemble(scenario: Scenario) -> Mission:
     for name in ("mujoco", "reduced"):
         mission.environment(name).reset()  # the start and the law's sensors must exist on both
     return mission
-
-
-def design(law: str) -> Design:
-    """Returns the design function of a law.
-
-    Args:
-        law: Its name in the registry.
-
-    Raises:
-        ValueError: If there is no such law.
-    """
-    if law not in REGISTRY:
-        raise ValueError(choices("law", law, REGISTRY, where="the registry"))
-    return REGISTRY[law]
 
 
 def reduced_plant(
@@ -233,16 +224,19 @@ def parameters_of(law: Design) -> dict[str, inspect.Parameter]:
     return {name: p for name, p in found.items() if p.kind is inspect.Parameter.KEYWORD_ONLY}
 
 
-def _controller_faults(table: Any) -> list[str]:
+def _controller_faults(table: Any, laws: Mapping[str, Design]) -> list[str]:
     """Faults of a scenario's controller table against the signature of its law's design."""
     if not isinstance(table, dict):
         return []  # the scenario's own validation says so
     law = table.get("law")
-    if law not in REGISTRY:
-        return [f"  controller.law: {choices('law', str(law), REGISTRY, where='the registry')}"]
+    if law not in laws:
+        return [f"  controller.law: {choices('law', str(law), laws, where='the registry')}"]
     fields: dict[str, Any] = {
-        name: (p.annotation, ... if p.default is p.empty else p.default)
-        for name, p in parameters_of(REGISTRY[law]).items()
+        name: (
+            Any if p.annotation is p.empty else p.annotation,
+            ... if p.default is p.empty else p.default,
+        )
+        for name, p in parameters_of(laws[law]).items()
     }
     model = create_model("controller", __base__=config.Model, law=(str, ...), **fields)
     return config.faults(model, table, prefix="controller.")

@@ -14,8 +14,8 @@ from spacecraft_sim.drawing import Drawing, Jet, Shape
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.trajectory import Trajectory
 
-Array = np.ndarray
-Color = tuple[int, int, int]
+Array, Stream = np.ndarray, rr.RecordingStream
+Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
 
 CHUNK = 250  # frames: the viewer loads and drops whole chunks
 TIMELINE = "sim_time"
@@ -24,13 +24,14 @@ NEAR = 8.0  # half-width of the plots that follow the cursor, s
 FINAL = 60.0  # the end of a flight, shown on its own in the phase plane, s
 
 WHITE, GREY, FAINT, NIGHT = (235, 238, 245), (120, 126, 140), (70, 75, 88), (13, 15, 22)
-GREEN, AMBER, PLUS, MINUS, OFF = (
-    *((98, 205, 132), (255, 200, 87)),
-    *((240, 98, 74), (74, 144, 240), (44, 47, 56)),
-)
-FULL = {"z": (77, 163, 255), "y": (98, 205, 132), "x": (255, 122, 144)}
-REDUCED = {"z": (255, 170, 64), "y": (228, 216, 92), "x": (214, 130, 255)}
-BOOMS = ((98, 205, 132), (199, 125, 255), (255, 200, 87), (90, 214, 220), (255, 122, 144))
+GREEN, AMBER = (98, 205, 132), (255, 200, 87)
+PLUS, MINUS, OFF = (240, 98, 74), (74, 144, 240), (44, 47, 56)
+AXES = {  # colours of the full and of the reduced flight
+    "z": ((77, 163, 255), (255, 170, 64)),
+    "y": ((98, 205, 132), (228, 216, 92)),
+    "x": ((255, 122, 144), (214, 130, 255)),
+}
+BOOMS = (((98, 205, 132), (49, 102, 66)), ((199, 125, 255), (99, 62, 127)), (AMBER, (127, 100, 43)))
 
 
 def write(
@@ -56,7 +57,7 @@ def write(
         title: Name of the recording.
         band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
     """
-    stream = rr.RecordingStream("spacecraft_sim")
+    stream = Stream("spacecraft_sim")
     stream.save(path)
     with stream:  # the file is complete when the block ends
         stream.send_recording_name(title)
@@ -65,19 +66,15 @@ def write(
         _solids(stream, drawing)
         _plumes(stream, drawing, measured)
         _motion(stream, drawing)
-        _vectors(stream, measured, predicted, band)
-        _tips(stream, measured, predicted, drawing)
+        _signals(stream, (predicted, measured), tuple(drawing.booms), band or 0.0)
         _thrust(stream, measured, drawing)
-        _phase_plane(stream, "phase/whole", measured, predicted, -np.inf, band)
+        _phase_plane(stream, "phase/whole", (predicted, measured), -np.inf)
         start = max(measured.time[-1] - FINAL, measured.time[-1] / 2)
-        _phase_plane(stream, "phase/end", measured, predicted, start, band)
+        _phase_plane(stream, "phase/end", (predicted, measured), start)
         _events(stream, measured, drawing, verdicts)
 
 
-# -- the spacecraft --------------------------------------------------------------------------------
-
-
-def _solids(stream: rr.RecordingStream, drawing: Drawing) -> None:
+def _solids(stream: Stream, drawing: Drawing) -> None:
     """Shapes once, in the frames of their bodies."""
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for body, kind in sorted({(shape.body, shape.kind) for shape in drawing.shapes}):
@@ -94,8 +91,8 @@ def _solid(kind: str, shapes: Sequence[Shape]) -> rr.AsComponents:
         "colors": np.array([shape.rgba for shape in shapes]),
         "fill_mode": "solid",
     }
-    if kind == "capsule":
-        # It starts at its origin here; MuJoCo's origin is its middle.
+    if kind in ("capsule", "sphere"):  # a sphere is a capsule of no length
+        # A capsule starts at its origin here; MuJoCo's origin is its middle.
         start = centre - size[:, 1:2] * _turned(quaternion, np.array([0.0, 0.0, 1.0]))
         radius, length = size[:, 0], 2 * size[:, 1]
         return rr.Capsules3D(radii=radius, lengths=length, translations=start, **look)
@@ -103,11 +100,10 @@ def _solid(kind: str, shapes: Sequence[Shape]) -> rr.AsComponents:
         return rr.Cylinders3D(radii=size[:, 0], lengths=2 * size[:, 1], centers=centre, **look)
     if kind == "box":
         return rr.Boxes3D(half_sizes=size, centers=centre, **look)
-    half = size if kind == "ellipsoid" else np.repeat(size[:, :1], 3, axis=1)
-    return rr.Ellipsoids3D(half_sizes=half, centers=centre, **look)
+    return rr.Ellipsoids3D(half_sizes=size, centers=centre, **look)
 
 
-def _motion(stream: rr.RecordingStream, drawing: Drawing) -> None:
+def _motion(stream: Stream, drawing: Drawing) -> None:
     """Body poses, and each boom as a line, unbent and bent too far, in chunks of frames."""
     quaternions = {body: np.roll(q, -1, axis=1) for body, q in drawing.quaternions.items()}
     lines = {}
@@ -116,17 +112,15 @@ def _motion(stream: rr.RecordingStream, drawing: Drawing) -> None:
         lines[f"unbent/{boom}"] = straight[:, [0, -1]]
         lines[f"bending/{boom}"] = straight + EXAGGERATION * (points - straight)
     for path in lines:
-        bent = path.startswith("bending")
-        style = (AMBER, -1.4) if bent else (GREY, -0.8)  # below zero: in points of the screen
-        look = rr.LineStrips3D.from_fields(colors=style[0], radii=style[1])
+        color = AMBER if path.startswith("bending") else GREY
+        look = rr.LineStrips3D.from_fields(colors=color, radii=-1.2)  # points of the screen
         stream.log(f"world/{path}", look, static=True)
     for k in range(0, len(drawing.time), CHUNK):
         part = slice(k, k + CHUNK)
         times = [rr.TimeColumn(TIMELINE, duration=drawing.time[part])]
         for body, position in drawing.positions.items():
-            pose = rr.Transform3D.columns(
-                translation=position[part], quaternion=quaternions[body][part]
-            )
+            turn = quaternions[body][part]
+            pose = rr.Transform3D.columns(translation=position[part], quaternion=turn)
             stream.send_columns(f"world/{body}", times, pose)
         for path, points in lines.items():
             strips = rr.LineStrips3D.columns(strips=points[part].astype(np.float32))
@@ -153,12 +147,12 @@ def _turned(quaternion: Array, vector: Array) -> Array:
 
 def _extent(drawing: Drawing) -> float:
     """Distance of the farthest body origin or boom tip from the first body, m."""
-    points = [p[0] for p in drawing.positions.values()]
-    points += [_boom_points(drawing, boom)[0][0, -1] for boom in drawing.booms]
-    return float(np.linalg.norm(np.array(points) - points[0], axis=1).max()) or 1.0
+    origins = np.array([position[0] for position in drawing.positions.values()])
+    tips = [_boom_points(drawing, boom)[0][0, -1] for boom in drawing.booms]
+    return float(np.linalg.norm(np.array([*origins, *tips]) - origins[0], axis=1).max()) or 1.0
 
 
-def _plumes(stream: rr.RecordingStream, drawing: Drawing, measured: Trajectory) -> None:
+def _plumes(stream: Stream, drawing: Drawing, measured: Trajectory) -> None:
     """Exhaust of every jet: against the force, longer at a higher level."""
     for k, jet in enumerate(drawing.jets):
         rows = _changes(measured[jet.channel])
@@ -196,95 +190,65 @@ def _cone(sides: int = 16) -> rr.Mesh3D:
     return rr.Mesh3D(
         vertex_positions=np.vstack([np.zeros(3), circle]),
         triangle_indices=np.stack([np.zeros(sides, int), rim, np.roll(rim, -1)], axis=1),
-        vertex_colors=np.array([(255, 246, 200, 255)] + sides * [(255, 96, 20, 40)], np.uint8),
+        vertex_colors=np.array([(255, 226, 130, 255)] + sides * [(255, 96, 20, 40)], np.uint8),
     )
 
 
-# -- signals ---------------------------------------------------------------------------------------
+def _signals(stream: Stream, flights: Flights, booms: Sequence[str], band: float) -> None:
+    """Angles, rates and tips of both plants; the quasi-rigid angle over the accuracy too."""
+    predicted, measured = flights
+    kinds = ("quasi_rigid_angle", "attitude", "quasi_rigid_rate", "rate")
+    rows = [(k, a, f"{k}_{a}", AXES[a], 0) for k in kinds for a in _moving_axes(measured, k)]
+    rows += [("tips", b, f"{b}_tip_y", BOOMS[k % 3], k) for k, b in enumerate(booms)]
+    for view, name, signal, (full, reduced), k in rows:
+        # Paths are drawn in the order of their names.  Booms often swing alike: the later ones are
+        # thinner, so that all can be seen.
+        for flight, plant, end, color, width in (
+            (predicted, "reduced", "reduced", reduced, max(4.0 - k, 1.6)),
+            (measured, "MuJoCo", "simulated", full, max(2.2 - 0.8 * k, 0.8)),
+        ):
+            if (value := flight.signals.get(signal)) is None:
+                continue
+            label = f"{name}, {plant} [{flight.units[signal]}]"
+            style = rr.SeriesLines(names=label, colors=color, widths=width)
+            _plot(stream, f"{view}/{name}/{end}", flight.time, value, style)
+            if band and view == "quasi_rigid_angle":
+                style = rr.SeriesLines(names=f"{name}, {plant}", colors=color, widths=width)
+                _plot(stream, f"accuracy/{name}/{end}", flight.time, value / band, style)
+    for sign in (-1.0, 1.0) if band else ():
+        for view, limit, unit in (("quasi_rigid_angle", band, " rad"), ("accuracy", 1.0, "")):
+            style = rr.SeriesLines(names=f"±{limit:g}{unit} asked", colors=GREEN, widths=1)
+            ends = measured.time[[0, -1]], np.full(2, sign * limit)
+            _plot(stream, f"{view}/limit/{'upper' if sign > 0 else 'lower'}", *ends, style)
 
 
-def _plot(
-    stream: rr.RecordingStream,
-    path: str,
-    time: Array,
-    value: Array,
-    name: str,
-    color: Color,
-    width: float,
-    **style,
-) -> None:
-    lines = rr.SeriesLines(names=name, colors=color, widths=width, **style)
-    stream.log(path, lines, static=True)
+def _plot(stream: Stream, path: str, time: Array, value: Array, style: rr.SeriesLines) -> None:
+    stream.log(path, style, static=True)
     times = [rr.TimeColumn(TIMELINE, duration=time)]
     stream.send_columns(path, times, rr.Scalars.columns(scalars=value))
 
 
-def _vectors(
-    stream: rr.RecordingStream, measured: Trajectory, predicted: Trajectory, band: float | None
-) -> None:
-    """Angles and rates of both plants, and the quasi-rigid angle in units of the accuracy."""
-    # Paths are drawn in the order of their names: MuJoCo's thin line over the reduced model's.
-    flights = ((predicted, "reduced", REDUCED, 4.0), (measured, "simulated", FULL, 1.6))
-    for kind in ("quasi_rigid_angle", "attitude", "quasi_rigid_rate", "rate"):
-        for axis in _moving_axes(measured, kind):
-            for flight, plant, colors, width in flights:
-                if (value := flight.signals.get(f"{kind}_{axis}")) is None:
-                    continue
-                name = f"{axis}, {'reduced' if plant == 'reduced' else 'MuJoCo'}"
-                path, look = f"{axis}/{plant}", (colors[axis], width)
-                unit = flight.units[f"{kind}_{axis}"]
-                _plot(stream, f"{kind}/{path}", flight.time, value, f"{name} [{unit}]", *look)
-                if band and kind == "quasi_rigid_angle":
-                    _plot(stream, f"accuracy/{path}", flight.time, value / band, name, *look)
-    for side in (-1.0, 1.0) if band else ():
-        for view, limit, name in (
-            ("quasi_rigid_angle", band, f"{band:g} rad asked"),
-            ("accuracy", 1.0, f"1 = {band:g} rad"),
-        ):
-            ends, level = measured.time[[0, -1]], side * np.full(2, limit)
-            path = f"{view}/limit/{'upper' if side > 0 else 'lower'}"
-            _plot(stream, path, ends, level, f"{'+' if side > 0 else '−'}{name}", GREEN, 1.0)
-
-
-def _tips(
-    stream: rr.RecordingStream, measured: Trajectory, predicted: Trajectory, drawing: Drawing
-) -> None:
-    for k, signal in enumerate(f"{boom}_tip_y" for boom in drawing.booms):
-        color = BOOMS[k % len(BOOMS)]
-        dim = tuple(c // 2 for c in color)
-        # Booms often swing alike: the later ones are thinner, so that all can be seen.
-        for flight, plant, look in (
-            (predicted, "reduced", (dim, max(4.0 - 0.8 * k, 1.6))),
-            (measured, "MuJoCo", (color, max(2.4 - 0.8 * k, 0.8))),
-        ):
-            if signal in flight.signals:
-                name = f"{signal}, {plant} [{flight.units[signal]}]"
-                path = f"tips/{signal}/{plant}"
-                _plot(stream, path, flight.time, flight[signal], name, *look)
-
-
-def _thrust(stream: rr.RecordingStream, measured: Trajectory, drawing: Drawing) -> None:
+def _thrust(stream: Stream, measured: Trajectory, drawing: Drawing) -> None:
     """Commanded and delivered thrust: as plots and as lanes of states."""
-    for channel in _channels(measured):
-        unit = _unit(channel, measured, drawing)
-        for what, signal, look in (
-            ("command", f"{channel}_command", (GREY, 1.0)),
-            ("delivered", channel, (AMBER, 1.8)),
-        ):
-            time, value = measured.time, measured[signal]
-            rows = np.union1d(_changes(value), len(value) - 1)
-            path, name = f"{channel}/{what}", f"{channel} {what} [{unit}]"
-            steps = {"interpolation_mode": "StepAfter", "aggregation_policy": "MinMax"}
-            _plot(stream, f"thrust/{path}", time[rows], value[rows], name, *look, **steps)
-            _lane(stream, f"relay/{path}", time[rows[:-1]], value[rows[:-1]], unit)
+    for channel, unit in _channels(measured, drawing).items():
+        for what, end, color in (("command", "_command", GREY), ("delivered", "", AMBER)):
+            signal = f"{channel}{end}"
+            rows = _changes(measured[signal])
+            time, value = measured.time[rows], measured[signal][rows]
+            _lane(stream, f"relay/{channel}/{what}", time, value, unit)
+            label = f"{channel} {what} [{unit}]"
+            style = rr.SeriesLines(names=label, colors=color, interpolation_mode="StepAfter")
+            time, value = np.append(time, measured.time[-1]), np.append(value, value[-1])
+            _plot(stream, f"thrust/{channel}/{what}", time, value, style)
 
 
-def _lane(stream: rr.RecordingStream, path: str, time: Array, value: Array, unit: str) -> None:
+def _lane(stream: Stream, path: str, time: Array, value: Array, unit: str) -> None:
     """The levels as states; a thrust that rises and falls has too many, its sign must do."""
-    exact = len(np.unique(value)) <= 16
-    value = value if exact else np.sign(value)
+    if len(np.unique(value)) > 16:
+        value, unit = np.sign(value), ""
+        time, value = time[_changes(value)], value[_changes(value)]
     levels = np.unique(value)
-    labels = [(f"{v:+.3g} {unit}" if exact else f"{v:+.0f}"[0]) if v else "off" for v in levels]
+    labels = [f"{v:+.3g} {unit}" if v else "off" for v in levels]
     share = np.abs(_throttle(levels))[:, None]
     bright = np.where(levels[:, None] > 0, PLUS, MINUS)
     colors = (OFF + share * (bright - OFF)).astype(np.uint8)
@@ -293,41 +257,28 @@ def _lane(stream: rr.RecordingStream, path: str, time: Array, value: Array, unit
     stream.send_columns(path, [rr.TimeColumn(TIMELINE, duration=time)], states)
 
 
-def _phase_plane(
-    stream: rr.RecordingStream,
-    path: str,
-    measured: Trajectory,
-    predicted: Trajectory,
-    start: float,
-    band: float | None,
-) -> None:
+def _phase_plane(stream: Stream, path: str, flights: Flights, start: float) -> None:
     """Angle against rate, each over its largest value: the view has equal axes and y down."""
-    axis = next(iter(_moving_axes(measured, "quasi_rigid_angle")), "")
+    axis = next(iter(_moving_axes(flights[1], "quasi_rigid_angle")), "")
     names = [f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"]
-    flights = [(f, f.time >= start) for f in (predicted, measured)]
-    if not all(name in flight.signals for flight, _ in flights for name in names):
+    if not all(name in flight.signals for flight in flights for name in names):
         return
-    tracks = [np.stack([f[name][late] for name in names], axis=1) for f, late in flights]
+    tracks = [np.stack([f[name][f.time >= start] for name in names], axis=1) for f in flights]
     largest = np.abs(tracks[1]).max(axis=0, initial=1e-12)
     tracks = [track * (1, -1) / largest for track in tracks]
     cross = rr.LineStrips2D([[(-1, 0), (1, 0)], [(0, -1), (0, 1)]], colors=FAINT, radii=-0.7)
     stream.log(f"{path}/axes", cross, static=True)
     # A label stands below its point: both points are moved off the curve.
     labels = [f"{largest[0]:.3g} rad", f"{largest[1]:.3g} rad/s"]
-    places = rr.Points2D([(1.25, -0.14), (0.35, -1.22)], labels=labels, colors=FAINT, radii=-0.1)
+    places = rr.Points2D([(1.38, -0.14), (0.4, -1.22)], labels=labels, colors=GREY, radii=-0.1)
     stream.log(f"{path}/scale", places, static=True)
-    if band and band < 1.2 * largest[0]:
-        sides = [[(s * band / largest[0], -1.1), (s * band / largest[0], 1.1)] for s in (-1, 1)]
-        stream.log(
-            f"{path}/accuracy", rr.LineStrips2D(sides, colors=GREEN, radii=-0.7), static=True
-        )
-    for k, (plant, colors, radius) in enumerate(
-        (("reduced", REDUCED, -1.8), ("simulated", FULL, -0.7))
+    for track, end, color, width in zip(
+        tracks, ("reduced", "simulated"), AXES[axis][::-1], (1.8, 0.7), strict=True
     ):
-        line = rr.LineStrips2D([tracks[k]], colors=colors[axis], radii=radius, draw_order=50 + k)
-        stream.log(f"{path}/{plant}", line, static=True)
+        line = rr.LineStrips2D([track], colors=color, radii=-width, draw_order=60 - width)
+        stream.log(f"{path}/{end}", line, static=True)
     stream.log(f"{path}/now", rr.Points2D.from_fields(colors=WHITE, radii=-5.0), static=True)
-    times = [rr.TimeColumn(TIMELINE, duration=measured.time[flights[1][1]])]
+    times = [rr.TimeColumn(TIMELINE, duration=flights[1].time[flights[1].time >= start])]
     stream.send_columns(f"{path}/now", times, rr.Points2D.columns(positions=tracks[1]))
 
 
@@ -352,37 +303,27 @@ def _moving_axes(flight: Trajectory, kind: str) -> list[str]:
     return sorted((a for a in peaks if peaks[a] >= least), key=lambda axis: -peaks[axis])
 
 
-def _channels(flight: Trajectory) -> list[str]:
-    return [name for name in flight.signals if f"{name}_command" in flight.signals]
-
-
-def _unit(channel: str, flight: Trajectory, drawing: Drawing) -> str:
-    """N or N m, where the jets tell which it is."""
-    forces = [bool(np.any(jet.force)) for jet in drawing.jets if jet.channel == channel]
-    return ("N" if forces[0] else "N m") if forces else flight.units[channel]
-
-
-# -- words -----------------------------------------------------------------------------------------
+def _channels(flight: Trajectory, drawing: Drawing) -> dict[str, str]:
+    """Thruster channels with their units: N or N m, where the jets tell which it is."""
+    names = [name for name in flight.signals if f"{name}_command" in flight.signals]
+    known = {jet.channel: "N" if np.any(jet.force) else "N m" for jet in drawing.jets}
+    return {name: known.get(name, flight.units[name]) for name in names}
 
 
 def _events(
-    stream: rr.RecordingStream, measured: Trajectory, drawing: Drawing, verdicts: Sequence[Verdict]
+    stream: Stream, measured: Trajectory, drawing: Drawing, verdicts: Sequence[Verdict]
 ) -> None:
     """Changes of command and thrust, and the instants that decided the verdicts."""
     events: list[tuple[float, str, str]] = []
-    for channel in _channels(measured):
-        unit = _unit(channel, measured, drawing)
-        for word, value in (
-            ("command", measured[f"{channel}_command"]),
-            ("thrust", measured[channel]),
-        ):
-            for row in _changes(value):
-                text = f"{channel}: {word} {value[row]:+.4g} {unit}"
-                events.append((measured.time[row], "INFO", text))
+    for channel, unit in _channels(measured, drawing).items():
+        for signal, word in ((f"{channel}_command", "command"), (channel, "thrust")):
+            for row in _changes(measured[signal]):
+                text = f"{channel}: {word} {measured[signal][row]:+.4g} {unit}"
+                events.append((float(measured.time[row]), "INFO", text))
     for v in verdicts:
         word = "closest to its bound" if v.holds else "broken" if v.margin < 0 else "not guaranteed"
         text = f"{word}: {v.claim}: {v.measured:.4g} {v.unit}"
-        t = measured.time[-1] if v.t_worst is None else v.t_worst
+        t = float(measured.time[-1]) if v.t_worst is None else v.t_worst
         events.append((t, "DEBUG" if v.holds else "ERROR", text))
     events.sort(key=lambda event: event[0])
     if events:
@@ -391,23 +332,16 @@ def _events(
         stream.send_columns("events", times, rr.TextLog.columns(text=text, level=level))
 
 
-def _documents(
-    stream: rr.RecordingStream, verdicts: Sequence[Verdict], scenario_toml: str, title: str
-) -> None:
+def _documents(stream: Stream, verdicts: Sequence[Verdict], scenario_toml: str, title: str) -> None:
     head = "|  | claim | predicted | measured | bound | margin | worst at | source |"
     lines = [f"### {title}", head, "|:-:|:--|--:|--:|--:|--:|--:|:--|"]
     for v in verdicts:
-        cells = (
-            "✔" if v.holds else "✘",
-            v.claim.replace("|", "\\|"),
-            "" if v.predicted is None else f"{v.predicted:.4g}",
-            f"{v.measured:.4g}",
-            f"{'±' if v.kind == 'within' else '≤ '}{v.bound:.3g} {v.unit}",
-            f"{100 * v.margin:.3g} %",
-            "" if v.t_worst is None else f"{v.t_worst:.2f} s",
-            v.source,
-        )
-        lines.append(f"| {' | '.join(cells)} |")
+        claim = f"{'✔' if v.holds else '✘'} | {v.claim.replace('|', chr(92) + '|')}"
+        expected = "" if v.predicted is None else f"{v.predicted:.4g}"
+        bound = f"{'±' if v.kind == 'within' else '≤ '}{v.bound:.3g} {v.unit}"
+        worst = "" if v.t_worst is None else f"{v.t_worst:.2f} s"
+        figures = f"{expected} | {v.measured:.4g} | {bound} | {100 * v.margin:.3g} % | {worst}"
+        lines.append(f"| {claim} | {figures} | {v.source} |")
     if failed := sorted({str(assumption) for v in verdicts for assumption in v.failed}):
         lines += ["", "**Assumptions that do not hold**", "", *(f"- `{text}`" for text in failed)]
     toml = f"```toml\n{scenario_toml.strip()}\n```"
@@ -415,35 +349,29 @@ def _documents(
         stream.log(path, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
 
 
-# -- the layout ------------------------------------------------------------------------------------
-
-
 def _blueprint(extent: float) -> rrb.Blueprint:
     """The layout; only the camera's distance follows the spacecraft, whose size is `extent`, m."""
     boundary = rr.TimeRangeBoundary
-    whole = rr.TimeRange(start=boundary.infinite(), end=boundary.infinite())
-    near = rr.TimeRange(
-        start=boundary.cursor_relative(seconds=-NEAR), end=boundary.cursor_relative(seconds=NEAR)
-    )
+    all_time = rr.TimeRange(start=boundary.infinite(), end=boundary.infinite())
+    before, after = (boundary.cursor_relative(seconds=s * NEAR) for s in (-1, 1))
+    whole = rrb.TimeAxis(view_range=all_time)
+    near = rrb.TimeAxis(view_range=rr.TimeRange(start=before, end=after))
 
-    def plot(origin: str, name: str, time=whole, axis_y: rrb.ScalarAxis | None = None):
-        x, legend = rrb.TimeAxis(view_range=time), rrb.PlotLegend(corner="RightTop")
-        return rrb.TimeSeriesView(
-            origin=origin, name=name, axis_x=x, axis_y=axis_y, plot_legend=legend
-        )
+    def plot(origin: str, name: str, time: rrb.TimeAxis = whole, **more) -> rrb.TimeSeriesView:
+        look = {"axis_x": time, "plot_legend": rrb.PlotLegend(corner="RightTop"), **more}
+        return rrb.TimeSeriesView(origin=origin, name=name, **look)
 
-    def plane(origin: str, name: str):
-        bounds = rrb.VisualBounds2D(x_range=[-1.5, 1.5], y_range=[-1.3, 1.2])
+    def plane(origin: str, name: str) -> rrb.Spatial2DView:
+        bounds = rrb.VisualBounds2D(x_range=[-1.4, 1.7], y_range=[-1.3, 1.2])
         return rrb.Spatial2DView(origin=origin, name=name, visual_bounds=bounds, background=NIGHT)
 
+    eye = extent * np.array([0.0, -1.2, 1.5])
     space = rrb.Spatial3DView(
         origin="world",
         name=f"Spacecraft; amber: bending × {EXAGGERATION:g}, grey: unbent",
         background=NIGHT,
         line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(
-            position=extent * np.array([0.0, -1.2, 1.5]), look_target=[0, 0, 0], eye_up=[0, 0, 1]
-        ),
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=[0, 0, 0], eye_up=[0, 0, 1]),
     )
     columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"])
     words = rrb.Tabs(
@@ -451,30 +379,26 @@ def _blueprint(extent: float) -> rrb.Blueprint:
         rrb.TextLogView(origin="events", name="Events", columns=columns),
         rrb.TextDocumentView(origin="scenario", name="Scenario"),
     )
-    limits = rrb.ScalarAxis(range=(-1.5, 1.5))
+    unity = rrb.ScalarAxis(range=(-1.5, 1.5))
     histories = rrb.Vertical(
         plot("quasi_rigid_angle", "Quasi-rigid angle [rad]"),
-        plot("accuracy", "Quasi-rigid angle / accuracy asked [-], near the cursor", near, limits),
+        plot("accuracy", "Quasi-rigid angle / accuracy [-], near the cursor", near, axis_y=unity),
         plot("attitude", "Attitude [rad]"),
         plot("tips", "Boom tips, deflection [m]"),
         rrb.Tabs(
             plot("rate", "Rate [rad/s]"), plot("quasi_rigid_rate", "Quasi-rigid rate [rad/s]")
         ),
     )
-    lanes = rrb.StateTimelineView(
-        origin="relay", name="Relay, near the cursor", time_view=rrb.TimeAxis(view_range=near)
-    )
     switching = rrb.Vertical(
         plane("phase/whole", "Phase plane: right = angle/max, up = rate/max"),
         plane("phase/end", "Phase plane of the last minute, scaled likewise"),
         plot("thrust", "Thrust, near the cursor", near),
-        lanes,
+        rrb.StateTimelineView(origin="relay", name="Relay, near the cursor", time_view=near),
         row_shares=[3, 3, 2, 1.4],
     )
     left = rrb.Vertical(space, words, row_shares=[3, 2])
     return rrb.Blueprint(
         rrb.Horizontal(left, histories, switching, column_shares=[4, 4, 3]),
         rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="paused", playback_speed=4),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
+        collapse_panels=True,
     )
