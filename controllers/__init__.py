@@ -9,5 +9,6 @@ from spacecraft_sim.guarantee import Guarantee
 Design = Callable[..., tuple[Controller, tuple[Guarantee, ...]]]  # (model, thrusters, **parameters)
 
 REGISTRY: dict[str, Design] = {
+    "efremov_local": efremov.design_local,
     "efremov_nonlocal": efremov.design_nonlocal,
 }

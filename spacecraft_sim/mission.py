@@ -228,9 +228,9 @@ def _controller_faults(table: Any, laws: Mapping[str, Design]) -> list[str]:
     """Faults of a scenario's controller table against the signature of its law's design."""
     if not isinstance(table, dict):
         return []  # the scenario's own validation says so
-    law = table.get("law")
+    law = str(table.get("law"))
     if law not in laws:
-        return [f"  controller.law: {choices('law', str(law), laws, where='the registry')}"]
+        return [f"  controller.law: {choices('law', law, laws, where='the registry')}"]
     fields: dict[str, Any] = {
         name: (
             Any if p.annotation is p.empty else p.annotation,

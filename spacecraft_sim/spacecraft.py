@@ -1,6 +1,5 @@
 """A spacecraft as plain validated data: its MJCF bus, its booms, its thrusters."""
 
-import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +9,7 @@ from spacecraft_sim import config, library
 from spacecraft_sim.beam import Rule
 from spacecraft_sim.checks import choices
 from spacecraft_sim.config import Model, quantity
+from spacecraft_sim.delay import Delay
 
 
 class Boom(Model):
@@ -24,61 +24,6 @@ class Boom(Model):
     tip_mass: float = quantity("point mass at the tip", "kg", 0.0, ge=0)
     n_hinges: int = quantity("hinges of the chain", "", 8, ge=1)
     rule: Rule = quantity("quadrature rule that places the hinges", "", "gauss_jacobi")
-
-
-class Delay(Model):
-    """Delay of an actuator: h(t) = mean + amplitude sin(frequency t + phase).
-
-    A command issued at t takes effect at the time a with a - h(a) = t.
-    """
-
-    mean: float = quantity("mean delay", "s", ge=0)
-    amplitude: float = quantity("amplitude of its variation", "s", 0.0)
-    frequency: float = quantity("angular frequency of its variation", "rad/s", 0.0)
-    phase: float = quantity("phase of its variation", "rad", 0.0)
-
-    @model_validator(mode="after")
-    def _runs_forwards(self) -> "Delay":
-        if abs(self.amplitude) > self.mean:
-            raise ValueError(
-                f"the delay goes negative: amplitude {self.amplitude} s > mean {self.mean} s"
-            )
-        if (speed := abs(self.amplitude * self.frequency)) >= 1:
-            raise ValueError(f"the delay runs backwards: amplitude * frequency = {speed} >= 1")
-        return self
-
-    @property
-    def longest(self) -> float:
-        """The upper bound of h, s."""
-        return self.mean + abs(self.amplitude)
-
-    def __call__(self, t: float) -> float:
-        """Returns h(t), s."""
-        return self.mean + self.amplitude * math.sin(self.frequency * t + self.phase)
-
-    def arrival(self, t: float) -> float:
-        """Returns the time at which a command issued at `t` takes effect, s.
-
-        Args:
-            t: Time of issue, s.
-        """
-        if self.amplitude == 0:
-            return t + self.mean
-        a = t + self.mean
-        # a -> t + h(a) contracts, Newton on a - h(a) - t converges from anywhere near.
-        for _ in range(50):
-            rate = 1 - self.amplitude * self.frequency * math.cos(self.frequency * a + self.phase)
-            step = (a - self(a) - t) / rate
-            a -= step
-            if abs(step) <= 1e-15 * max(1.0, abs(a)):
-                return a
-        return self._arrival_by_bisection(t)
-
-    def _arrival_by_bisection(self, t: float) -> float:
-        lo, hi = t + self.mean - abs(self.amplitude), t + self.longest
-        while lo < (mid := (lo + hi) / 2) < hi:
-            lo, hi = (mid, hi) if mid - self(mid) < t else (lo, mid)
-        return hi
 
 
 class Failure(Model):

@@ -185,7 +185,7 @@ def test_hinges_ascend_inside_the_boom_with_positive_weights(rule, n):
 
 
 def test_unknown_rule_is_refused_with_the_choices():
-    with pytest.raises(ValueError, match="'simpson' is not known.*gauss_jacobi.*mid"):
+    with pytest.raises(ValueError, match=r"'simpson' is not known.*gauss_jacobi.*mid"):
         beam.hinge_rule("simpson", 4)
 
 

@@ -140,7 +140,7 @@ def test_fault_is_one_line_with_path_limit_and_value(table, fault):
 
 def test_all_faults_are_named_at_once_under_the_name_of_the_file():
     table = {"spare": {"length": math.nan, "turns": 0}, "prats": []}
-    with pytest.raises(ValueError, match="file.toml:") as error:
+    with pytest.raises(ValueError, match=r"file\.toml:") as error:
         config.validate(Whole, table, where="file.toml")
     first, *lines = str(error.value).splitlines()
     assert first == "file.toml:"

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from controllers.efremov import ANGLE, RATE, NonlocalRelay, attracting, design_nonlocal, limit_cycle
+from controllers.efremov import (
+    ANGLE,
+    RATE,
+    MultilevelRelay,
+    attracting,
+    design_nonlocal,
+    limit_cycle,
+)
 from spacecraft_sim.disturbance import Disturbance, Torque
 from spacecraft_sim.reduced import ReducedPhysics, double_integrator, galerkin_start
 from spacecraft_sim.scenario import Initial
@@ -127,7 +134,7 @@ def test_limit_cycle_figures():
 @pytest.mark.parametrize(("c", "delay"), [(0.31, 0.2), (1.0, 0.05), (0.5, 0.9)])
 def test_flight_of_the_relay_ends_in_the_limit_cycle(c, delay):
     p = 0.007
-    law = NonlocalRelay(
+    law = MultilevelRelay(
         c=c, thresholds=(), levels=(p,), attraction=0.0, attraction_level=0.0, period=None
     )
     # The transient falls as e^(-ct): after 40/c it is below rounding.
@@ -204,6 +211,27 @@ def test_on_a_bound_s_belongs_to_the_cell_that_it_enters(n, side):
         u_beyond, beyond = law.step(1.0, (0.0, side * goal), memory)
         assert u_on_bound == u_beyond
         assert on_bound == beyond
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_a_first_measurement_on_a_threshold_counts_as_over_it(n, side):
+    # A = p 3^k with k the number of thresholds v_n <= |s|, on either side.
+    law, _ = design_nonlocal(**PAPER)
+    (u,), _ = law.step(0.0, (0.0, side * law.thresholds[n - 1]), law.init())
+    assert u == -side * law.levels[n]
+
+
+def test_a_mirrored_start_flies_the_mirrored_flight():
+    law, _ = design_nonlocal(**PAPER, attraction_level=0.001)
+    engine = thrusters(levels=(0.001, *LEVELS))
+    one, other = (
+        flight(law, engine, duration=60.0, angle=side * 0.3, rate=side * -0.01) for side in (1, -1)
+    )
+    # The equations are odd and rounding is symmetric: bit for bit.
+    assert one.time.tolist() == other.time.tolist()
+    for name in (ANGLE, RATE, "thruster_z", "thruster_z_command"):
+        assert np.array_equal(one[name], -other[name]), name
 
 
 def test_attracting_pulses_come_before_the_feedback():

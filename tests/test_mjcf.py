@@ -231,6 +231,8 @@ def test_exported_file_is_the_same_machine_for_plain_mujoco(machine, tmp_path):
         (("<motor", '<position kp="2"'), "'thruster_z' drives a thruster and must be a <motor>"),
         (('gear="0 0 0 0 0 1"', 'ctrlrange="-2 2" gear="0 0 0 0 0 1"'),
          r"'thruster_z' has the level 3\.0, outside the ctrlrange \[-2\.0, 2\.0\]"),
+        (('gear="0 0 0 0 0 1"', 'ctrlrange="-2 5" gear="0 0 0 0 0 1"'),
+         r"'thruster_z' has the level 3\.0, outside the ctrlrange \[-2\.0, 5\.0\]"),
         (("<site name=\"centre\"/>", "<sight/>"), r"(?s)hub\.xml: .*sight"),
     ],
 )  # fmt: skip
@@ -251,7 +253,7 @@ def test_contacts_are_refused_unless_they_cannot_happen(machine):
 
 
 def test_all_reasons_not_to_fly_are_given_at_once(machine):
-    with pytest.raises(ValueError, match="gravity is on.*density"):
+    with pytest.raises(ValueError, match=r"gravity is on.*density"):
         compiled(machine(xml=('gravity="0 0 0"', 'gravity="0 0 -1" density="1"')))
 
 

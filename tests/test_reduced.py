@@ -151,7 +151,7 @@ def test_piece_and_its_parts_are_the_same_motion():
     whole, parts = plant(), plant()
     whole.begin([1.0, 0.5], [0.3, 0.0])
     whole.advance(1.0)
-    for start, end in ((0.0, 0.05), (0.05, 0.3), (0.3, 0.300001), (0.300001, 1.0)):
+    for start, end in ((0.0, 0.05), (0.05, 0.099), (0.099, 0.3), (0.3, 0.300001), (0.300001, 1.0)):
         parts.begin([1.0 + 0.3 * start, 0.5], [0.3, 0.0])
         parts.advance(end)
     # Rounding; momentum is of order one.
@@ -203,9 +203,8 @@ def test_reset_returns_to_rest_at_time_zero():
 
 def test_divergence_is_reported():
     physics = plant()
-    physics.begin([np.inf, 0.0], [0.0, 0.0])
-    with np.errstate(invalid="ignore"):
-        physics.advance(0.1)
+    physics.begin([np.nan, 0.0], [0.0, 0.0])
+    physics.advance(0.1)
     with pytest.raises(PhysicsError, match=r"diverged before t = 0\.1 s"):
         physics.check_divergence()
 
@@ -278,9 +277,9 @@ def test_bent_mode_that_the_model_lacks_is_refused():
 
 def test_unknown_names_are_refused_with_the_nearest():
     physics = plant()
-    with pytest.raises(ValueError, match="sensor 'rate' is not in the reduced model; .*'rate_z'"):
+    with pytest.raises(ValueError, match=r"sensor 'rate' is not in the reduced model; .*'rate_z'"):
         physics.select(("rate",))
-    with pytest.raises(ValueError, match="input 'thruster' .*did you mean 'thruster_z'"):
+    with pytest.raises(ValueError, match=r"input 'thruster' .*did you mean 'thruster_z'"):
         physics.model.gain("thruster", "rate_z")
-    with pytest.raises(ValueError, match="output 'rate' .*did you mean 'rate_z'"):
+    with pytest.raises(ValueError, match=r"output 'rate' .*did you mean 'rate_z'"):
         physics.model.gain("thruster_z", "rate")

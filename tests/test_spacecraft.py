@@ -206,7 +206,7 @@ def test_every_fault_of_a_file_is_named_at_once(tmp_path):
         delay = {mean = 0.1, amplitude = 0.2}
         """,
     )
-    with pytest.raises(ValueError, match="probe.toml") as fault:
+    with pytest.raises(ValueError, match=r"probe\.toml") as fault:
         spacecraft.load(path)
     message = str(fault.value)
     for part in (

@@ -172,9 +172,24 @@ def test_failure_is_an_edge_and_the_end_of_obedience(level):
     assert found == [(0.0, 0.75, 0.0), (0.75, 1.25, 1.0), (1.25, 4.0, level)]
 
 
+def test_pulse_that_waits_to_end_is_cut_by_the_failure_and_leaves_no_edge():
+    spec = relay(min_on_time=4.0, failure={"time": 1.25, "level": 0.0})
+    assert flown(spec, [(0.0, 1.0), (0.5, 0.0)], end=6.0) == [
+        (0.0, 0.5, 1.0, 0.0), (0.5, 1.25, 1.0, 0.0), (1.25, 6.0, 0.0, 0.0),
+    ]  # fmt: skip
+
+
+def test_pause_may_be_shorter_than_the_minimum_on_time():
+    sequence = [(0.0, 1.0), (2.5, 0.0), (2.75, 1.0)]
+    assert merged(flown(relay(min_on_time=2.0), sequence, end=4.0)) == [
+        (0.0, 2.5, 1.0), (2.5, 2.75, 0.0), (2.75, 4.0, 1.0),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("on", [0.0, 2.0])
 @pytest.mark.parametrize("delay", [0.0, 0.5])
-def test_second_command_at_the_same_instant_replaces_the_first(delay):
-    thrusters = Thrusters([relay(delay=delay)])
+def test_second_command_at_the_same_instant_replaces_the_first(delay, on):
+    thrusters = Thrusters([relay(delay=delay, min_on_time=on)])
     state = thrusters.command(1.0, [1.0], thrusters.init())
     state = thrusters.command(1.0, [-2.5], state)
     assert thrusters.output(1.0 + delay, state)[0] == [-2.5]
@@ -282,6 +297,29 @@ def test_failure_freezes_the_thrust_and_changes_nothing_before(spec, sequence, t
     for start, _, thrust, slope in broken:
         if start > settled + 1e-9:  # a later command cuts no ramp: there is none any more
             assert (thrust, slope) == (level, 0.0)
+
+
+@given(spec=specs, sequence=commands(), time=st.floats(0, 20), late=st.floats(0, 5))
+def test_command_that_arrives_after_the_failure_changes_nothing(spec, sequence, time, late):
+    failed = spec.model_validate(spec.model_dump() | {"failure": {"time": time, "level": 1.0}})
+    thrusters = Thrusters([failed])
+    state = thrusters.init()
+    for issue, level in sequence:
+        state = thrusters.command(issue, [level], state)
+    issue = max(time, sequence[-1][0]) + late
+    for level in (0.0, -TOP):
+        assert thrusters.command(issue, [level], state) == state
+
+
+@given(spec=specs, sequence=commands(), pick=st.integers(0, 20))
+def test_command_issued_on_an_edge_keeps_thrust_within_its_limits(spec, sequence, pick):
+    edges = [stop for _, stop, *_ in flown(spec, sequence)]
+    at = edges[pick % len(edges)]
+    earlier = [command for command in sequence if command[0] < at]
+    for start, stop, thrust, slope in flown(spec, [*earlier, (at, -TOP), (at + 0.5, 1.0)], 99.0):
+        assert abs(thrust + slope * (stop - start)) <= TOP + ROUNDING
+        if start > spec.delay.arrival(at + 0.5) + spec.min_on_time + 5:
+            assert (thrust, slope) == (1.0, 0.0)
 
 
 @given(spec=specs, sequence=commands())

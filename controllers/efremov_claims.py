@@ -1,0 +1,248 @@
+"""What Efremov, Polyakov & Strygin (2006) guarantee, as claims that a flight can be held to.
+
+beta, v and f stand for beta/J, v/J and f/J: rad, rad/s, rad/s^2.  A pass on beta is no pass on the
+attitude gamma, which swings on with the booms; it has a claim of its own, which no theorem backs.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from controllers.efremov_relay import ANGLE, RATE, MultilevelRelay, attracting, limit_cycle
+from spacecraft_sim.guarantee import Assumption, Guarantee, Measurement
+from spacecraft_sim.reduced import ReducedModel
+from spacecraft_sim.thrusters import Thrusters
+from spacecraft_sim.trajectory import Trajectory, peak
+
+PAPER = "Efremov et al. 2006"
+FINAL = 60.0  # the end of a flight over which final figures are taken, s
+
+Measure = Callable[[Trajectory], Measurement]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Theorem:
+    """One theorem with its numbers.
+
+    Attributes:
+        source: Where it stands.
+        parameters: Hypotheses that the design decides.
+        accuracy: eps, rad.
+        settling: Time after the start of feedback from which |beta| < eps, s.
+        final_angle: Bound of |beta| in the end, rad.
+        final_rate: Bound of |v| in the end, rad/s.
+        disturbance: |f| must stay below this, rad/s^2.
+        entry: Hypotheses on (beta, v) at the start of feedback.
+    """
+
+    source: str
+    parameters: tuple[Assumption, ...]
+    accuracy: float
+    settling: float
+    final_angle: float
+    final_rate: float
+    disturbance: float
+    entry: Callable[[float, float], tuple[Assumption, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claims:
+    """The guarantees of one design.
+
+    Attributes:
+        theorem: What is promised.
+        law: The law.
+        model: The plant, for the scale of the disturbance.
+        thrusters: The thrusters; ideal if None.
+    """
+
+    theorem: Theorem
+    law: MultilevelRelay
+    model: ReducedModel
+    thrusters: Thrusters | None
+
+    def all(self) -> tuple[Guarantee, ...]:
+        """Returns every claim."""
+        theorem, source = self.theorem, self.theorem.source
+        claims = [
+            self._claim("|beta/J| < eps from the predicted time on", source, "rad",
+                        theorem.accuracy, self._after_settling),
+            self._claim("|beta/J| in the end", f"{source}, proof", "rad",
+                        theorem.final_angle, self._final(ANGLE, RATE)),
+            self._claim("|v/J| in the end", f"{source}, proof", "rad/s",
+                        theorem.final_rate, self._final(RATE, None)),
+        ]  # fmt: skip
+        if self.law.attraction:
+            claims.insert(0, self._attraction())
+        return (*claims, *self._limit_cycle(), self._attitude())
+
+    def printed_rate(self) -> Guarantee:
+        """Returns the printed claim |v| < eps, guaranteed only where the repaired bound gives it."""
+        repaired = Assumption(
+            text="2 S < eps: the repaired bound gives the printed one",
+            value=self.theorem.final_rate,
+            limit=self.theorem.accuracy,
+            relation="<=",
+            unit="rad/s",
+        )
+        return Guarantee(
+            claim="|v/J| < eps in the end, as printed",
+            source=f"{self.theorem.source}, as printed",
+            unit="rad/s",
+            bound=self.theorem.accuracy,
+            measure=self._final(RATE, None),
+            assumptions=(*self.theorem.parameters, repaired),
+        )
+
+    def _claim(
+        self, claim: str, source: str, unit: str, bound: float, measure: Measure
+    ) -> Guarantee:
+        return Guarantee(
+            claim=claim,
+            source=source,
+            unit=unit,
+            bound=bound,
+            measure=self._under_hypotheses(measure),
+            assumptions=self.theorem.parameters,
+        )
+
+    def _attraction(self) -> Guarantee:
+        """The miss: without compensation the delay leaves h v0."""
+
+        def miss(trajectory: Trajectory) -> Measurement:
+            end = self._feedback_start(trajectory) + self._delay()
+            if end > trajectory.time[-1]:
+                return Measurement(math.nan)
+            beta = float(np.interp(end, trajectory.time, trajectory[ANGLE]))
+            return Measurement(beta, end, predicted=self._predicted_miss(trajectory))
+
+        return Guarantee(
+            claim="attraction leaves |beta/J| < eps",
+            source=f"{PAPER}, (2.2)",
+            unit="rad",
+            bound=self.theorem.accuracy,
+            measure=miss,
+        )
+
+    def _attitude(self) -> Guarantee:
+        return Guarantee(
+            claim="attitude itself: |gamma| < eps in the end",
+            source="not promised by the theorem",
+            unit="rad",
+            bound=self.theorem.accuracy,
+            measure=self._final("attitude_z", "rate_z"),
+        )
+
+    def _limit_cycle(self) -> list[Guarantee]:
+        """Closed forms, where they apply: ideal relay, constant delay, continuous time."""
+        spec = self.thrusters[self.law.thrusters[0]] if self.thrusters else None
+        holds = all(a.holds for a in self.theorem.parameters)
+        if spec is None or self.law.period is not None or spec.delay.amplitude or not holds:
+            return []
+        h, c, p = spec.delay.mean, self.law.c, self.law.lowest
+        cycle = limit_cycle(c=c, delay=h, level=p)
+        figures = (
+            ("period", "s", cycle.period, self._period, 0.0),
+            ("|v/J|", "rad/s", cycle.v_max, self._final(RATE, None), 0.0),
+            # A steady f moves the centre of the cycle by f h (1 - c h/2)/c.
+            ("|beta/J|", "rad", cycle.beta_max, self._final(ANGLE, RATE), h / c),
+        )
+
+        def near(measure: Measure, predicted: float, shift: float) -> Measure:
+            def measured(trajectory: Trajectory) -> Measurement:
+                f, m = self._disturbance(trajectory), measure(trajectory)
+                return Measurement(m.value, m.t_worst, bound=2 * f / p * predicted + shift * f)
+
+            return measured
+
+        return [
+            Guarantee(
+                claim=f"limit cycle: {name}",
+                source=f"{PAPER}, closed form, +-2 f/p",
+                unit=unit,
+                kind="within",
+                predicted=value,
+                measure=near(measure, value, shift),
+            )
+            for name, unit, value, measure, shift in figures
+        ]
+
+    # -- measurements --------------------------------------------------------------------------
+
+    def _under_hypotheses(self, measure: Measure) -> Measure:
+        """Adds the hypotheses that only the flight can tell."""
+
+        def measured(trajectory: Trajectory) -> Measurement:
+            m, start = measure(trajectory), self._feedback_start(trajectory)
+            beta, v = (
+                float(np.interp(start, trajectory.time, trajectory[x])) for x in (ANGLE, RATE)
+            )
+            disturbance = Assumption(
+                text="|f/J| below the bound of the theorem",
+                value=self._disturbance(trajectory),
+                limit=self.theorem.disturbance,
+                unit="rad/s^2",
+            )
+            assumptions = (disturbance, *self.theorem.entry(beta, v))
+            return Measurement(m.value, m.t_worst, m.predicted, m.bound, assumptions)
+
+        return measured
+
+    def _after_settling(self, trajectory: Trajectory) -> Measurement:
+        start = self._feedback_start(trajectory) + self.theorem.settling
+        late = trajectory.time >= start
+        if not late.any():
+            return Measurement(math.nan)
+        worst = peak(trajectory.time[late], trajectory[ANGLE][late], trajectory[RATE][late])
+        predicted = abs(self._predicted_miss(trajectory)) if self.law.attraction else None
+        return Measurement(*worst, predicted=predicted)
+
+    def _final(self, signal: str, rate: str | None) -> Measure:
+        """Largest |signal| over the last minute; between the rows too where its rate is known."""
+
+        def measure(trajectory: Trajectory) -> Measurement:
+            start = self._feedback_start(trajectory) + self._delay()
+            late = trajectory.time >= max(trajectory.time[-1] - FINAL, start)
+            if not late.any():
+                return Measurement(math.nan)
+            time, x = trajectory.time[late], trajectory[signal][late]
+            if rate is None:
+                worst = int(np.argmax(np.abs(x)))
+                return Measurement(float(abs(x[worst])), float(time[worst]))
+            return Measurement(*peak(time, x, trajectory[rate][late]))
+
+        return measure
+
+    def _period(self, trajectory: Trajectory) -> Measurement:
+        """Mean time between switchings of the thrust to plus, over the last minute."""
+        late = trajectory.time >= trajectory.time[-1] - FINAL
+        thrust, time = np.sign(trajectory[self.law.thrusters[0]][late]), trajectory.time[late]
+        rising = time[1:][(thrust[1:] > 0) & (thrust[:-1] <= 0)]
+        return Measurement(float(np.mean(np.diff(rising))) if len(rising) > 1 else math.nan)
+
+    def _disturbance(self, trajectory: Trajectory) -> float:
+        """The largest |f/J| of a flight, rad/s^2."""
+        signal = trajectory.signals.get("disturbance_z")
+        if signal is None:
+            return 0.0
+        return float(np.max(np.abs(signal))) * abs(self.model.gain("disturbance_z", RATE))
+
+    def _feedback_start(self, trajectory: Trajectory) -> float:
+        """T2 of a flight, s; its first row if there is no attraction."""
+        if not self.law.attraction:
+            return float(trajectory.time[0])
+        return float(trajectory.time[0]) + self._pulses(trajectory).T2
+
+    def _pulses(self, trajectory: Trajectory):
+        v = trajectory[RATE][0]
+        beta = trajectory[ANGLE][0] + v * self.law.compensated_delay
+        return attracting(beta, v, self.law.attraction)
+
+    def _predicted_miss(self, trajectory: Trajectory) -> float:
+        """(h - compensated h) v0: until the first pulse acts the spacecraft drifts on."""
+        return (self._delay() - self.law.compensated_delay) * float(trajectory[RATE][0])
+
+    def _delay(self) -> float:
+        return self.thrusters[self.law.thrusters[0]].delay.mean if self.thrusters else 0.0
