@@ -79,7 +79,7 @@ class Claims:
         return (*claims, *self._limit_cycle(), self._attitude())
 
     def printed_rate(self) -> Guarantee:
-        """Returns the printed claim |v| < eps, guaranteed only where the repaired bound gives it."""
+        """Returns the printed claim |v| < eps, guaranteed only where the repaired one gives it."""
         repaired = Assumption(
             text="2 S < eps: the repaired bound gives the printed one",
             value=self.theorem.final_rate,

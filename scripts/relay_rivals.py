@@ -9,7 +9,8 @@ import scipy.linalg
 from scipy.integrate import solve_ivp
 
 from spacecraft_sim import beam, reduced
-from spacecraft_sim.relay_system import RelaySystem, Run, State, propagate, system_of
+from spacecraft_sim.modal_form import system_of
+from spacecraft_sim.relay_system import RelaySystem, Run, State, propagate
 
 C, LEVEL, DELAY, DURATION, ANGLE = 0.31, 0.007, 0.3664, 100.0, 0.001
 

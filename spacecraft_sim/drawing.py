@@ -114,11 +114,11 @@ def draw(
 
 
 _KINDS = {
-    mujoco.mjtGeom.mjGEOM_BOX: "box",
-    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
-    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
-    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
-    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
+    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
 }
 
 
@@ -126,14 +126,14 @@ def _shapes(model: mujoco.MjModel) -> tuple[Shape, ...]:
     return tuple(
         Shape(
             body=model.body(int(model.geom_bodyid[g])).name,
-            kind=_KINDS[model.geom_type[g]],
+            kind=_KINDS[int(model.geom_type[g])],
             size=model.geom_size[g].copy(),
             position=model.geom_pos[g].copy(),
             quaternion=model.geom_quat[g].copy(),
             rgba=model.geom_rgba[g].copy(),
         )
         for g in range(model.ngeom)
-        if model.geom_type[g] in _KINDS and model.geom_bodyid[g]
+        if int(model.geom_type[g]) in _KINDS and model.geom_bodyid[g]
     )
 
 

@@ -149,7 +149,7 @@ def _s(row: Row, x: State) -> float:
 
 
 def _s_at_return(system: RelaySystem, delay: float, P: float) -> float:
-    """s a delay before the input turns back: zero for a cycle."""
+    """Returns s a delay before the input turns back: zero for a cycle."""
     return _s(system.switching, _state_at(system, _antisymmetric(system, P), P - delay))
 
 

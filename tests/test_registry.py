@@ -13,22 +13,38 @@ from controllers import REGISTRY
 from spacecraft_sim import library, mission
 from spacecraft_sim.controller import Controller
 from spacecraft_sim.guarantee import Guarantee
+from spacecraft_sim.scenario import Scenario
 
-# A scenario to start from and what a law needs changed in it, by law; then by (law, spacecraft).
-SCENARIOS = {"efremov_nonlocal": ("efremov-nonlocal", "initial.attitude=[0.0, 0.0, 0.003]")}
-CHANGES = {
-    ("efremov_nonlocal", "two_boom"): (),
-    ("efremov_nonlocal", "two_boom_free"): ("controller.attraction_level=0.2",),
+J = 1183.2375  # kg m^2, of both machines
+ARM = {"two_boom": 1.0, "two_boom_free": 5.0}  # torque of a unit level, m
+CLOSE = {"max_delay": 0.21, "accuracy": 0.007, "c": 0.31}  # Efremov et al. (2006), section 5
+CONTROLLERS = {
+    "efremov_local": CLOSE,
+    "efremov_nonlocal": {**CLOSE, "radius": 0.1, "gain": 2.765},
+}
+# Accelerations that the laws need, rad/s^2: p 3^k with p of Theorems 1 and 2.
+ACCELERATIONS = {
+    "efremov_local": [1.5 * 0.31**2 * 0.007],
+    "efremov_nonlocal": [3.75 * 0.31**2 * 0.007 * 2.765 * 3**k for k in range(5)],
 }
 PAIRS = list(itertools.product(REGISTRY, library.spacecraft_names()))
 
 
 @functools.cache
 def ready(law, machine):
-    name, *settings = SCENARIOS[law]
-    settings += [f"spacecraft={machine}", f"controller.law={law}", "duration=4.0"]
-    scenario = mission.load_scenario(name, (*settings, *CHANGES[law, machine]))
-    return mission.assemble(scenario)
+    levels = [a * J / ARM[machine] for a in ACCELERATIONS[law]]
+    table = {
+        "name": f"{law} on {machine}",
+        "title": "a short flight",
+        "spacecraft": machine,
+        "duration": 4.0,
+        "initial": {"attitude": (0.0, 0.0, 0.0015), "boom_amplitude": 0.02},
+        "controller": {"law": law, **CONTROLLERS[law]},
+        "thrusters": {"all": {"levels": levels, "delay": 0.2}},
+        "disturbance": {"z": {"amplitude": 0.001, "frequency": 1.0}},
+        "reduced": {"source": "mjcf", "modes": 2},
+    }
+    return mission.assemble(Scenario.model_validate(table))
 
 
 @functools.cache
@@ -36,9 +52,9 @@ def flight(law, machine, plant):
     return ready(law, machine).fly(plant)
 
 
-def test_there_are_laws_and_spacecraft():
-    assert "efremov_nonlocal" in REGISTRY
-    assert {"two_boom", "two_boom_free"} <= set(library.spacecraft_names())
+def test_every_law_and_every_spacecraft_is_flown_here():
+    assert set(CONTROLLERS) == set(ACCELERATIONS) == set(REGISTRY)
+    assert set(ARM) == set(library.spacecraft_names())
 
 
 @pytest.mark.parametrize(("law", "machine"), PAIRS)
