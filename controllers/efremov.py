@@ -101,6 +101,7 @@ def design_local(
     theorem = Theorem(
         source=f"{PAPER}, Theorem 1",
         parameters=(*parameters, pending, *_hardware(law, thrusters, max_delay)),
+        max_delay=max_delay,
         accuracy=accuracy,
         settling=0.0,
         final_angle=3 * accuracy / 4,
@@ -183,6 +184,7 @@ def design_nonlocal(
     theorem = Theorem(
         source=f"{PAPER}, Theorem 2",
         parameters=(*parameters, *_hardware(law, thrusters, max_delay)),
+        max_delay=max_delay,
         accuracy=accuracy,
         # The theorem names no time.  Attraction leaves nothing to settle; from far away no one of
         # 4000 random runs took longer than 1.22 (ln(R/eps) + 1)/c.

@@ -29,6 +29,7 @@ class Theorem:
     Attributes:
         source: Where it stands.
         parameters: Hypotheses that the design decides.
+        max_delay: h0, s.
         accuracy: eps, rad.
         settling: Time after the start of feedback from which |beta| < eps, s.
         final_angle: Bound of |beta| in the end, rad.
@@ -39,6 +40,7 @@ class Theorem:
 
     source: str
     parameters: tuple[Assumption, ...]
+    max_delay: float
     accuracy: float
     settling: float
     final_angle: float
@@ -153,7 +155,15 @@ class Claims:
         def near(measure: Measure, predicted: float, shift: float) -> Measure:
             def measured(trajectory: Trajectory) -> Measurement:
                 f, m = self._disturbance(trajectory), measure(trajectory)
-                return Measurement(m.value, m.t_worst, bound=2 * f / p * predicted + shift * f)
+                error = max((abs(lag - h) for lag in self._lags(trajectory)), default=0.0)
+                as_designed = Assumption(
+                    text="delay seen in flight is the one designed for, within 1 us",
+                    value=error,
+                    limit=1e-6,
+                    unit="s",
+                )
+                bound = 2 * f / p * predicted + shift * f
+                return Measurement(m.value, m.t_worst, None, bound, (as_designed,))
 
             return measured
 
@@ -185,7 +195,13 @@ class Claims:
                 limit=self.theorem.disturbance,
                 unit="rad/s^2",
             )
-            assumptions = (disturbance, *self.theorem.entry(beta, v))
+            age = Assumption(
+                text="delay seen in flight, and sampling period, < h0",
+                value=max(self._lags(trajectory), default=0.0) + (self.law.period or 0.0),
+                limit=self.theorem.max_delay,
+                unit="s",
+            )
+            assumptions = (disturbance, age, *self.theorem.entry(beta, v))
             return Measurement(m.value, m.t_worst, m.predicted, m.bound, assumptions)
 
         return measured
@@ -228,6 +244,15 @@ class Claims:
         if signal is None:
             return 0.0
         return float(np.max(np.abs(signal))) * abs(self.model.gain("disturbance_z", RATE))
+
+    def _lags(self, trajectory: Trajectory) -> list[float]:
+        """Times from each change of the command to the change of thrust that follows it, s."""
+        channel, time = self.law.thrusters[0], trajectory.time
+        command = np.r_[0.0, trajectory[f"{channel}_command"]]
+        issued = time[np.flatnonzero(np.diff(command))]
+        followed = time[1:][np.flatnonzero(np.diff(trajectory[channel]))]
+        n = min(len(issued), len(followed))
+        return (followed[:n] - issued[:n]).tolist()
 
     def _feedback_start(self, trajectory: Trajectory) -> float:
         """T2 of a flight, s; its first row if there is no attraction."""

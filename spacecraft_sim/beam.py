@@ -85,16 +85,21 @@ def mode_shape(order: int, x: Array, length: float, *, derivative: int = 0) -> A
 
     Returns:
         Phi or its derivative at `x`, same shape, 1/m^derivative.
+
+    Raises:
+        ValueError: If `order` or `length` is not positive.
     """
+    positive(order=order, length=length)
     z = wave_numbers(order)[-1]
-    sigma = _sigma(z)
+    sigma, e = _sigma(z), np.exp(-z)
     phase = np.asarray(x) * z / length
     quarter = derivative * np.pi / 2
-    # Phi = cosh - cos - sigma (sinh - sin); the hyperbolic part is written with decaying
-    # exponentials because cosh - sigma sinh loses all digits for high modes.
-    growing, decaying = (1 - sigma) / 2, (1 + sigma) / 2 * (-1) ** derivative
+    # Phi = cosh - cos - sigma (sinh - sin).  For high modes cosh - sigma sinh cancels: its growing
+    # part (1 - sigma)/2 e^phase is written with (1 - sigma)/2 = growing e^-z in closed form.
+    growing = (np.sin(z) - np.cos(z) - e) / (1 - e * e + 2 * e * np.sin(z))
+    decaying = (1 + sigma) / 2 * (-1) ** derivative
     shape = (
-        growing * np.exp(phase)
+        growing * np.exp(phase - z)
         + decaying * np.exp(-phase)
         - np.cos(phase + quarter)
         + sigma * np.sin(phase + quarter)

@@ -223,9 +223,7 @@ def _export(arguments: argparse.Namespace) -> int:
         from spacecraft_sim import mission
 
         scenario = mission.load_scenario(name)
-        machine = spacecraft.load(scenario.spacecraft).with_parts(
-            scenario.changes("booms"), scenario.changes("thrusters")
-        )
+        machine = spacecraft.load(scenario.spacecraft).with_parts(**scenario.changes())
     else:
         machine = spacecraft.load(name)
     if arguments.file.exists():

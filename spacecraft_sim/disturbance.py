@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 from spacecraft_sim.config import Model, quantity
 
@@ -11,16 +11,33 @@ _RESOLVED = 0.25  # rad of phase a line may span: its mean is then exact to 0.25
 
 
 class Torque(Model):
-    """A torque about one bus axis: constant + amplitude sin(frequency t + phase)."""
+    """A torque about one bus axis: constant + amplitude w(frequency t + phase)."""
 
     constant: float = quantity("constant part", "N m", 0.0)
     amplitude: float = quantity("amplitude of the periodic part", "N m", 0.0)
     frequency: float = quantity("angular frequency of the periodic part", "rad/s", 0.0)
     phase: float = quantity("phase of the periodic part", "rad", 0.0)
+    waveform: Literal["sine", "square"] = quantity("w, a sine or its sign", "", "sine")
 
     def __call__(self, t: float) -> float:
         """Returns the torque at `t`, N m."""
-        return self.constant + self.amplitude * math.sin(self.frequency * t + self.phase)
+        wave = math.sin(self.frequency * t + self.phase)
+        if self.waveform == "square":
+            wave = math.copysign(1.0, wave)
+        return self.constant + self.amplitude * wave
+
+    def next_edge(self, t: float) -> float:
+        """Returns the first time after `t` at which a square wave turns over, s; inf if none.
+
+        Args:
+            t: Time, s.
+        """
+        if self.waveform == "sine" or self.frequency == 0:
+            return math.inf
+        half = math.pi / abs(self.frequency)
+        first = -self.phase / self.frequency
+        turns = math.floor((t - first) / half + 1e-9) + 1
+        return first + turns * half
 
 
 class Disturbance:
@@ -34,7 +51,8 @@ class Disturbance:
     def __init__(self, torques: Mapping[Any, Torque]):
         self.names = tuple(f"disturbance_{axis}" for axis in torques)
         self._torques = tuple(torques.values())
-        fastest = max((abs(t.frequency) for t in self._torques if t.amplitude), default=0.0)
+        smooth = [t for t in self._torques if t.amplitude and t.waveform == "sine"]
+        fastest = max((abs(t.frequency) for t in smooth), default=0.0)
         self.longest = _RESOLVED / fastest if fastest else math.inf
 
     def value(self, t: float) -> list[float]:
@@ -44,6 +62,14 @@ class Disturbance:
             t: Time, s.
         """
         return [torque(t) for torque in self._torques]
+
+    def next_edge(self, t: float) -> float:
+        """Returns the first time after `t` at which a torque jumps, s; inf if none.
+
+        Args:
+            t: Time, s.
+        """
+        return min((torque.next_edge(t) for torque in self._torques), default=math.inf)
 
     def line(self, t0: float, t1: float) -> tuple[list[float], list[float]]:
         """Returns value at `t0` and rate of the straight line that stands for the torque.

@@ -68,7 +68,7 @@ def linearize(model: mujoco.MjModel) -> Linearization:
     outputs, y0, C = _linear_readings(model)
     return Linearization(
         M=undeformed_mass_matrix(model),
-        D=np.diag(_linear_coefficients(model.dof_damping)),
+        D=np.diag(model.dof_damping) + _actuator_damping(model),
         K=np.diag(_dof_stiffness(model)),
         B=_actuator_forces(model),
         C=C,
@@ -155,10 +155,12 @@ def _refuse_nonlinear(model: mujoco.MjModel) -> None:
         faults.append("joint limits or tendons")
     if np.any(model.dof_frictionloss):
         faults.append("dry friction")
-    if np.any(model.jnt_stiffness.reshape(model.njnt, -1)[:, 1:]):
+    if np.any(model.jnt_stiffnesspoly):
         faults.append("polynomial joint stiffness")
-    if np.any(model.dof_damping.reshape(model.nv, -1)[:, 1:]):
+    if np.any(model.dof_dampingpoly):
         faults.append("polynomial joint damping")
+    if model.opt.density or model.opt.viscosity:
+        faults.append("a medium with density or viscosity")
     if np.any(model.qpos_spring != model.qpos0):
         faults.append("springs that pull at the reference configuration (springref)")
     if np.any(model.actuator_biastype != mujoco.mjtBias.mjBIAS_NONE):
@@ -169,18 +171,12 @@ def _refuse_nonlinear(model: mujoco.MjModel) -> None:
         raise ValueError(f"the model is not linear at its reference: it has {'; '.join(faults)}")
 
 
-def _linear_coefficients(coefficients: Array) -> Array:
-    """The linear term of coefficients that may be stored as polynomials, shape (n,)."""
-    return np.asarray(coefficients).reshape(len(coefficients), -1)[:, 0]
-
-
 def _dof_stiffness(model: mujoco.MjModel) -> Array:
-    stiffness = _linear_coefficients(model.jnt_stiffness)
     per_dof = np.zeros(model.nv)
     width = {mujoco.mjtJoint.mjJNT_FREE: 6, mujoco.mjtJoint.mjJNT_BALL: 3}
     for j in range(model.njnt):
         start = model.jnt_dofadr[j]
-        per_dof[start : start + width.get(model.jnt_type[j], 1)] = stiffness[j]
+        per_dof[start : start + width.get(model.jnt_type[j], 1)] = model.jnt_stiffness[j]
     return per_dof
 
 
@@ -203,6 +199,22 @@ def _actuator_forces(model: mujoco.MjModel) -> Array:
         mujoco.mj_forward(model, data)
         B[:, i] = data.qfrc_actuator
     return B
+
+
+def _actuator_damping(model: mujoco.MjModel) -> Array:
+    """Motors may carry viscous damping of their own, along their transmission."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    moment = np.zeros((model.nu, model.nv))
+    if model.nu:
+        mujoco.mju_sparse2dense(
+            moment,
+            data.actuator_moment.ravel(),
+            data.moment_rownnz.ravel(),
+            data.moment_rowadr.ravel(),
+            data.moment_colind.ravel(),
+        )
+    return moment.T @ (model.actuator_damping[:, None] * moment)
 
 
 def _linear_readings(model: mujoco.MjModel) -> tuple[dict[str, str], Array, Array]:

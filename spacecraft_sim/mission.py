@@ -36,12 +36,12 @@ class Mission:
 
     Attributes:
         scenario: The scenario.
-        machine: The spacecraft with the scenario's changes.
+        machine: The spacecraft that flies in MuJoCo.
         mujoco: The full plant.
         reduced: The reduced plant.
         controller: The law.
         guarantees: What is claimed of it.
-        thrusters: The thrusters.
+        thrusters: The thrusters of each plant.
         disturbance: The disturbance torques.
     """
 
@@ -51,7 +51,7 @@ class Mission:
     reduced: reduced.ReducedPhysics
     controller: Controller
     guarantees: tuple[Guarantee, ...]
-    thrusters: Thrusters
+    thrusters: dict[PlantName, Thrusters]
     disturbance: Disturbance
 
     def environment(self, plant: PlantName = "mujoco") -> Environment:
@@ -63,7 +63,7 @@ class Mission:
         accuracy = self.scenario.controller.get("accuracy", 1e-2)
         task = ControlTask(
             self.controller,
-            self.thrusters,
+            self.thrusters[plant],
             initial=self.scenario.initial,
             disturbance=self.disturbance,
             accuracy=accuracy,
@@ -142,15 +142,17 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
     Raises:
         ValueError: If machine, law and scenario do not fit together; the message says where.
     """
-    machine = spacecraft.load(scenario.spacecraft).with_parts(
-        scenario.changes("booms"), scenario.changes("thrusters")
-    )
+    nominal = spacecraft.load(scenario.spacecraft).with_parts(**scenario.changes())
+    machine = nominal.with_parts(**scenario.actual_changes())
     disturbance = Disturbance(scenario.disturbance)
-    full = MujocoPhysics.fly(
-        machine, timestep=scenario.simulation.timestep, disturbances=disturbance.names
+    build = partial(
+        MujocoPhysics.fly,
+        timestep=scenario.simulation.timestep,
+        disturbances=disturbance.names,
     )
-    plant = reduced_plant(scenario, machine, full)
-    thrusters = Thrusters(machine.thrusters)
+    full = build(machine)
+    plant = reduced_plant(scenario, nominal, full if machine == nominal else build(nominal))
+    thrusters = Thrusters(nominal.thrusters)
     parameters = {key: value for key, value in scenario.controller.items() if key != "law"}
     design = laws[scenario.controller["law"]]
     law, guarantees = design(plant.model, thrusters, **parameters)
@@ -161,7 +163,7 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
         reduced=plant,
         controller=law,
         guarantees=guarantees + conservation.momentum_balances(plant.model),
-        thrusters=thrusters,
+        thrusters={"mujoco": Thrusters(machine.thrusters), "reduced": thrusters},
         disturbance=disturbance,
     )
     for name in ("mujoco", "reduced"):

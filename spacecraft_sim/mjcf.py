@@ -10,6 +10,7 @@ torques on the bus.
 
 from collections.abc import Iterable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -95,7 +96,7 @@ def compile(
     """
     spec, disturbances = assemble(spacecraft), tuple(disturbances)
     for name in disturbances:
-        axis = AXES.index(name.removeprefix("disturbance_"))
+        axis = _axis_of(name)
         site = spec.body(BUS).add_site(name=name)
         spec.add_actuator(
             name=name,
@@ -118,6 +119,13 @@ def compile(
     return model
 
 
+def _axis_of(disturbance: str) -> int:
+    known = {f"disturbance_{axis}": k for k, axis in enumerate(AXES)}
+    if disturbance not in known:
+        raise ValueError(choices("disturbance", disturbance, known, where="a flight"))
+    return known[disturbance]
+
+
 def export(spacecraft: Spacecraft, path: Path) -> None:
     """Writes the complete MJCF as one file that plain MuJoCo loads.
 
@@ -127,7 +135,39 @@ def export(spacecraft: Spacecraft, path: Path) -> None:
     """
     spec = assemble(spacecraft)
     spec.compile()
-    path.write_text(spec.to_xml(), encoding="utf-8")
+    root = ElementTree.fromstring(spec.to_xml())
+    for element in root.iter("body"):
+        if element.get("name") in _grown(spacecraft):
+            _write_all_digits(element, spec)
+    ElementTree.indent(root)
+    path.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
+
+
+def _grown(spacecraft: Spacecraft) -> set[str]:
+    """Names of the bodies that booms add to the bus."""
+    names = {name for boom in spacecraft.booms for name in hinge_names(boom)}
+    ends = {f"{boom.name}_{end}" for boom in spacecraft.booms for end in ("0", "tip_mass")}
+    return names | ends
+
+
+def _write_all_digits(element: ElementTree.Element, spec: mujoco.MjSpec) -> None:
+    """Replaces the six digits that MuJoCo writes of a boom's body by all that there are."""
+    body = spec.body(element.get("name"))
+    numbers = {
+        "body": {"pos": body.pos, "quat": body.quat},
+        "inertial": {"pos": body.ipos, "mass": body.mass, "diaginertia": body.inertia},
+    }
+    parts = [element, *element.findall("inertial")]
+    for joint in element.findall("joint"):
+        found = spec.joint(joint.get("name"))
+        numbers["joint"] = {"stiffness": found.stiffness[0], "damping": found.damping[0]}
+        parts.append(joint)
+    for site in element.findall("site"):
+        numbers["site"] = {"pos": spec.site(site.get("name")).pos}
+        parts.append(site)
+    for part in parts:
+        for key, value in numbers[part.tag].items():
+            part.set(key, " ".join(repr(float(x)) for x in np.atleast_1d(value)))
 
 
 def hinge_names(boom: Boom) -> list[str]:

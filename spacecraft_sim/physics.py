@@ -23,6 +23,7 @@ from dm_control.mujoco import wrapper
 from dm_control.rl import control
 
 from spacecraft_sim import linearize, mjcf
+from spacecraft_sim.checks import positive
 from spacecraft_sim.readings import Readings
 from spacecraft_sim.scenario import Initial
 from spacecraft_sim.spacecraft import Spacecraft
@@ -59,6 +60,7 @@ class MujocoPhysics(dm_mujoco.Physics):
         Raises:
             ValueError: If the machine is not valid, or the step is over the limit of stability.
         """
+        positive(timestep=timestep)
         disturbances = tuple(disturbances)
         model = mjcf.compile(spacecraft, timestep=timestep, disturbances=disturbances)
         require_stable_step(model, timestep)
@@ -147,7 +149,7 @@ class MujocoPhysics(dm_mujoco.Physics):
         """
         model, data = self._pointers
         if value != self._value or slope != self._slope or any(slope):
-            self._value, self._slope = value, slope
+            self._value, self._slope = list(value), list(slope)
             for k, i in self._wiring:
                 self._act[k], self._ctrl[k] = value[i], slope[i]
         mujoco.mj_getState(model, data, self._opened, _STATE)
@@ -215,7 +217,8 @@ class MujocoPhysics(dm_mujoco.Physics):
         Raises:
             PhysicsError: Saying when it was found not to be.
         """
-        size = float(self._qvel.dot(self._qvel) + self._qpos.dot(self._qpos))
+        with np.errstate(over="ignore", invalid="ignore"):
+            size = float(self._qvel.dot(self._qvel) + self._qpos.dot(self._qpos))
         if not size < _HUGE**2:  # also true for NaN
             raise control.PhysicsError(
                 f"the MuJoCo plant diverged before t = {self.time():.6g} s: its coordinates or "

@@ -120,7 +120,10 @@ def _sensors(model: mujoco.MjModel, data: mujoco.MjData) -> list[Block]:
             units, start = {}, first + size
         else:
             suffixes = {1: ("",), 3: ("_x", "_y", "_z")}.get(size) or [f"_{k}" for k in range(size)]
-            units |= {f"{name}{suffix}": unit for suffix in suffixes}
+            for suffix in suffixes:
+                if f"{name}{suffix}" in units:
+                    raise ValueError(f"two sensors give the reading {name + suffix!r}; rename one")
+                units[f"{name}{suffix}"] = unit
     return blocks + _plain(units, data.sensordata[start:])
 
 

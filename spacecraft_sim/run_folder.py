@@ -67,8 +67,8 @@ def resolved(scenario: Scenario) -> str:
         scenario: The scenario.
     """
     table = scenario.model_dump(mode="json", exclude_none=True)
-    table["booms"], table["thrusters"] = scenario.changes("booms"), scenario.changes("thrusters")
-    return config.dumps({**table, "versions": versions()})
+    changes = {**scenario.changes(), "actual": scenario.actual_changes()}
+    return config.dumps({**table, **changes, "versions": versions()})
 
 
 def write_verdicts(folder: Path, mission: Mission, comparison: Comparison) -> None:

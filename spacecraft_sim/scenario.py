@@ -29,15 +29,6 @@ class Simulation(Model):
     substeps: int = quantity("steps to a control step, at which rows are recorded", "", 10, ge=1)
 
 
-class Reduced(Model):
-    """The reduced model that flies beside MuJoCo."""
-
-    source: Literal["galerkin", "mjcf"] = quantity(
-        "Bubnov-Galerkin with cantilever shapes, or modes of the compiled MJCF", "", "mjcf"
-    )
-    modes: int = quantity("elastic modes kept", "", 1, ge=0)
-
-
 def _changes(part: type[Model]) -> Any:
     """The model of a table that changes some numbers of a part and leaves the others."""
     fields: dict[str, Any] = {
@@ -50,6 +41,22 @@ def _changes(part: type[Model]) -> Any:
 
 # pyright: reportInvalidTypeForm=false
 BoomChanges, ThrusterChanges = _changes(Boom), _changes(Thruster)
+
+
+class Actual(Model):
+    """How the machine that flies in MuJoCo differs from the one that the law was designed for."""
+
+    booms: dict[str, BoomChanges] = quantity("changed numbers by boom, or of all", "", {})
+    thrusters: dict[str, ThrusterChanges] = quantity("changed numbers by thruster", "", {})
+
+
+class Reduced(Model):
+    """The reduced model that flies beside MuJoCo."""
+
+    source: Literal["galerkin", "mjcf"] = quantity(
+        "Bubnov-Galerkin with cantilever shapes, or modes of the compiled MJCF", "", "mjcf"
+    )
+    modes: int = quantity("elastic modes kept", "", 1, ge=0)
 
 
 class Scenario(Model):
@@ -68,16 +75,22 @@ class Scenario(Model):
     )
     booms: dict[str, BoomChanges] = quantity("changed numbers by boom, or of all", "", {})
     thrusters: dict[str, ThrusterChanges] = quantity("changed numbers by thruster", "", {})
+    actual: Actual = quantity("what only the MuJoCo plant has", "", Actual())
     simulation: Simulation = quantity("integration", "", Simulation())
     reduced: Reduced = quantity("reduced model", "", Reduced())
     versions: dict[str, str] = quantity("versions that flew it, for the record", "", {})
 
-    def changes(self, kind: Literal["booms", "thrusters"]) -> dict[str, dict[str, Any]]:
-        """Returns the changed numbers of booms or thrusters as plain tables by name.
+    def changes(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """Returns the changed numbers as plain tables: `booms` and `thrusters`, each by name."""
+        return _tables(self)
 
-        Args:
-            kind: Which parts.
-        """
-        return {
-            name: part.model_dump(exclude_unset=True) for name, part in getattr(self, kind).items()
-        }
+    def actual_changes(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """Returns what is changed further for the MuJoCo plant alone, likewise."""
+        return _tables(self.actual)
+
+
+def _tables(changed: Any) -> dict[str, dict[str, dict[str, Any]]]:
+    return {
+        kind: {name: part.model_dump(exclude_unset=True) for name, part in parts.items()}
+        for kind, parts in (("booms", changed.booms), ("thrusters", changed.thrusters))
+    }

@@ -81,7 +81,7 @@ class Spacecraft(Model):
                 raise ValueError(f"{kind} names must differ; given twice: {', '.join(twice)}")
         return self
 
-    def with_parts(self, booms: config.Table, thrusters: config.Table) -> "Spacecraft":
+    def with_parts(self, *, booms: config.Table, thrusters: config.Table) -> "Spacecraft":
         """Returns the spacecraft with some numbers of its booms and thrusters replaced.
 
         Args:

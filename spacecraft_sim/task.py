@@ -134,8 +134,10 @@ class ControlTask(control.Task):
         t = physics.time()
         while t < end:
             sample = math.inf if period is None else self._samples * period
-            limits = end, self._edge, sample, t + disturbance.longest, _foreseen(self._trace)
-            stop = min(limits)
+            jump = disturbance.next_edge(t)
+            stop = min(
+                end, self._edge, sample, jump, t + disturbance.longest, _foreseen(self._trace)
+            )
             torque, rate = disturbance.line(t, stop)
             value, rates = self._thrust + torque, self._slope + rate
             physics.begin(value, rates)
@@ -145,7 +147,7 @@ class ControlTask(control.Task):
                 stop, decided = self._switching(physics, stop)
             if self.recorder:
                 self._accumulate(value, rates, stop - t)
-            t, landed = stop, stop == self._edge
+            t, landed = stop, stop in (self._edge, jump)
             if decided:
                 self._decide(t)
             elif landed or any(self._slope):

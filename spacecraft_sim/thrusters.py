@@ -105,8 +105,16 @@ def nearest_level(level: float, spec: Thruster) -> float:
     Args:
         level: Wanted thrust, N or N m.
         spec: The thruster.
+
+    Raises:
+        ValueError: If the level is not a number.
     """
-    amplitude = min((0.0, *spec.levels), key=lambda x: abs(x - abs(level)))
+    if math.isnan(level):
+        raise ValueError(
+            f"thruster {spec.name!r} is commanded nan; it has the levels {spec.levels}"
+        )
+    wanted = min(abs(level), spec.levels[-1])
+    amplitude = min((0.0, *spec.levels), key=lambda x: abs(x - wanted))
     return math.copysign(amplitude, level) if amplitude else 0.0
 
 
@@ -114,12 +122,13 @@ def _commanded(t: float, level: float, channel: Channel, spec: Thruster) -> Chan
     arrival = spec.delay.arrival(t)
     if spec.failure and arrival >= spec.failure.time:
         return channel
-    # A change that had to wait for the minimum on-time gives way to the later command.
+    # A change that had to wait for the minimum on-time gives way to the later command, and so does
+    # one of the same instant.
     changes = [change for change in channel.changes if change[0] < arrival]
-    time, present = changes[-1]
+    time, present = changes[-1] if changes else (-math.inf, math.nan)
     if level != present:
-        free = time + spec.min_on_time if present else arrival
-        changes.append((max(arrival, free), level))
+        locked = present != 0 and bool(changes)
+        changes.append((max(arrival, time + spec.min_on_time) if locked else arrival, level))
     # What lies before t is history: keep the valve change in force at t and the thrust it met.
     first = bisect_right([time for time, _ in changes], t) - 1
     start = channel.thrust

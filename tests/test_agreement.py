@@ -125,7 +125,7 @@ def test_flight_of_the_printed_coefficients():
         coefficients, torques={"thruster_z": 1.0, "disturbance_z": 1.0}, tips={"left": 7.5}
     )
     levels = [1.0] + [0.007 * 1183.24 * 3**k for k in range(5)]
-    machine = ready().machine.with_parts({}, {"all": {"levels": levels}})
+    machine = ready().machine.with_parts(booms={}, thrusters={"all": {"levels": levels}})
     thrusters = mission.Thrusters(machine.thrusters)
     parameters = {k: v for k, v in ready().scenario.controller.items() if k != "law"}
     law, _ = REGISTRY["efremov_nonlocal"](model, thrusters, **parameters)

@@ -24,15 +24,9 @@ from spacecraft_sim.thrusters import Thrusters
 
 ANGLE, RATE = "quasi_rigid_angle_z", "quasi_rigid_rate_z"
 # Section 5 of the paper, in rad, rad/s and rad/s^2.
-PAPER = {
-    "max_delay": 0.21,
-    "accuracy": 0.007,
-    "radius": 0.1,
-    "c": 0.31,
-    "gain": 2.765,
-    "level": 0.007,
-    "threshold": 0.0045,
-}
+PAPER = dict(
+    max_delay=0.21, accuracy=0.007, radius=0.1, c=0.31, gain=2.765, level=0.007, threshold=0.0045
+)
 LEVELS = tuple(0.007 * 3.0**k for k in range(5))
 
 
@@ -58,9 +52,6 @@ def carried(beta, v, pulses, U):
     for u, span in ((sign * U, T1), (-sign * U, T2 - T1)):
         beta, v = beta + v * span + u * span**2 / 2, v + u * span
     return beta, v
-
-
-# -- attraction, (2.2) -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -109,19 +100,13 @@ def test_on_the_boundary_curves_one_pulse_is_enough(v):
     # Gamma+ (v^2 + 2 beta = 0, v >= 0) belongs to G+, Gamma- to G-; all numbers are exact.
     assert attracting(-v * v / 2, v, 1.0) == (-1.0, v, v)
     assert attracting(v * v / 2, -v, 1.0) == (1.0, v, v)
-
-
-def test_at_the_origin_there_is_nothing_to_do():
-    assert attracting(0.0, 0.0, 1.0)[1:] == (0.0, 0.0)
+    assert attracting(0.0, 0.0, v)[1:] == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("U", [0.0, -1.0, math.nan, math.inf])
 def test_attraction_needs_a_positive_thrust(U):
     with pytest.raises(ValueError, match="acceleration"):
         attracting(1.0, 0.0, U)
-
-
-# -- the limit cycle ----------------------------------------------------------------------------
 
 
 def test_limit_cycle_figures():
@@ -156,19 +141,11 @@ def test_flight_of_the_relay_ends_in_the_limit_cycle(c, delay):
 
 @pytest.mark.parametrize(
     ("key", "value", "message"),
-    [
-        ("delay", 4.0, "c h = 1.24"),
-        ("delay", 0.0, "delay = 0.0"),
-        ("c", -1.0, "c = -1.0"),
-        ("level", math.nan, "level = nan"),
-    ],
+    [("delay", 4.0, "c h = 1.24"), ("c", -1.0, "c = -1.0"), ("level", math.nan, "level = nan")],
 )
 def test_limit_cycle_refuses_what_has_none(key, value, message):
     with pytest.raises(ValueError, match=message):
         limit_cycle(**{"c": 0.31, "delay": 0.2, "level": 0.007, key: value})
-
-
-# -- the law ------------------------------------------------------------------------------------
 
 
 def test_steps_1_to_5_of_theorem_2():
@@ -202,10 +179,7 @@ def test_thrust_is_p_3_to_the_thresholds_passed_against_s(beta, v):
 def test_on_a_bound_s_belongs_to_the_cell_that_it_enters(n, side):
     law, _ = design_nonlocal(**PAPER)
     bound = (0.0, *law.thresholds)[n]
-    inner, outer = (law.thresholds[0] / 2, law.thresholds[0] * 2)
-    if n:
-        inner, outer = bound * 0.9, bound * 1.1
-    inner, outer = (-inner, inner) if n == 0 else (inner, outer)
+    inner, outer = bound - 1e-3, bound + 1e-3  # the narrowest cell is 4.5e-3 wide
     for start, goal in ((inner, outer), (outer, inner)):
         _, memory = law.step(0.0, (0.0, side * start), law.init())
         u_on_bound, on_bound = law.step(1.0, (0.0, side * bound), memory)
@@ -247,9 +221,6 @@ def test_attracting_pulses_come_before_the_feedback():
     assert law.events(2.0 + T1, y, memory)[0] == pytest.approx(T2 - T1, rel=1e-12)  # a clock's ulp
     u, _ = law.step(2.0 + T2, y, memory)
     assert u[0] == -LEVELS[4]  # s = .207, over v_4 = .1215
-
-
-# -- hypotheses ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -321,12 +292,13 @@ def assert_outcome(verdicts, failed):
         assert failed is None or any(failed in a.text for a in verdict.failed), verdict.claim
 
 
-@pytest.mark.parametrize("changes", [{"rise_time": 0.01}, {"min_on_time": 0.5}, {"fall_time": 1.0}])
-def test_a_thruster_that_is_not_a_relay_is_outside_the_theorem(changes):
-    law, guarantees = design_nonlocal(None, thrusters(**changes), **PAPER)
-    verdicts = judged(guarantees, flight(law, thrusters(**changes), duration=20.0, angle=0.05))
-    assert len(verdicts) == 4
+@pytest.mark.parametrize("lag", ["rise_time", "fall_time", "min_on_time"])
+def test_a_thruster_that_is_not_a_relay_is_outside_the_theorem(lag):
+    engine = thrusters(**{lag: 0.5})
+    law, guarantees = design_nonlocal(None, engine, **PAPER)
+    verdicts = judged(guarantees, flight(law, engine, duration=20.0, angle=0.05))
     assert_outcome(verdicts, "follows the valve")
+    assert len(verdicts) == 4
 
 
 @pytest.mark.parametrize(

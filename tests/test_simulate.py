@@ -9,6 +9,7 @@ from absl.testing import absltest
 from dm_env import StepType, test_utils
 
 import spacecraft_sim
+from controllers.efremov import attracting
 from spacecraft_sim import mission
 from spacecraft_sim.disturbance import Disturbance
 from spacecraft_sim.scenario import Initial
@@ -168,6 +169,18 @@ def test_a_reset_starts_afresh():
     assert angles(episode(environment)) == first
 
 
+def test_a_second_episode_is_planned_from_its_own_start():
+    environment = spacecraft_sim.load(NAME, "duration=25.0", *SCATTER)
+    ends = []
+    for _ in range(2):
+        track = simulate(environment, meta={})
+        start = (float(track[f"quasi_rigid_{x}_z"][0]) for x in ("angle", "rate"))
+        ends.append(attracting(*start, 1 / 1183.2375).T1)  # 1 N m on J
+        changes = track.time[1:][np.diff(track["thruster_z_command"]) != 0]
+        assert changes[0] == pytest.approx(ends[-1], abs=2e-11)  # width of a root
+    assert ends[0] != ends[1]
+
+
 def test_one_assembly_flies_twice_the_same():
     ready = mission.assemble(mission.load_scenario(NAME, (SHORT,)))
     assert_same(ready.fly(), ready.fly())
@@ -209,7 +222,7 @@ class Runaway:
 def runaway(plant):
     settings = ("duration=5.0", "thrusters.all.levels=[1e12]", "disturbance={}")
     scenario = mission.load_scenario(NAME, settings)
-    full = mission.spacecraft.load("two_boom").with_parts({}, scenario.changes("thrusters"))
+    full = mission.spacecraft.load("two_boom").with_parts(**scenario.changes())
     physics = mission.MujocoPhysics.fly(full, timestep=0.02)
     if plant == "reduced":
         physics = mission.reduced_plant(scenario, full, physics)

@@ -148,8 +148,8 @@ def test_names_that_are_given_twice_are_refused(kind, part):
 def test_changes_for_all_come_before_changes_by_name():
     probe = Spacecraft.model_validate(table(booms=[BOOM, BOOM | {"name": "right"}]))
     changed = probe.with_parts(
-        {"all": {"length": 5.0, "n_hinges": 4}, "right": {"length": 6.0}},
-        {"jet": {"delay": 0.1}},
+        booms={"all": {"length": 5.0, "n_hinges": 4}, "right": {"length": 6.0}},
+        thrusters={"jet": {"delay": 0.1}},
     )
     assert [(b.length, b.n_hinges) for b in changed.booms] == [(5.0, 4), (6.0, 4)]
     assert changed.thrusters[0].delay.mean == 0.1
@@ -168,7 +168,7 @@ def test_changes_for_all_come_before_changes_by_name():
 )
 def test_change_that_makes_no_sense_is_refused(booms, thrusters, message):
     with pytest.raises(ValueError, match=message):
-        Spacecraft.model_validate(table()).with_parts(booms, thrusters)
+        Spacecraft.model_validate(table()).with_parts(booms=booms, thrusters=thrusters)
 
 
 def test_file_gives_its_stem_as_name_and_its_folder_to_the_mjcf(tmp_path):
