@@ -94,7 +94,7 @@ class Claims:
             source=f"{self.theorem.source}, as printed",
             unit="rad/s",
             bound=self.theorem.accuracy,
-            measure=self._final(RATE, None),
+            measure=self._under_hypotheses(self._final(RATE, None)),
             assumptions=(*self.theorem.parameters, repaired),
         )
 
@@ -135,6 +135,7 @@ class Claims:
             unit="rad",
             bound=self.theorem.accuracy,
             measure=self._final("attitude_z", "rate_z"),
+            signals=("attitude_z", "rate_z"),
         )
 
     def _limit_cycle(self) -> list[Guarantee]:
@@ -143,6 +144,8 @@ class Claims:
         holds = all(a.holds for a in self.theorem.parameters)
         if spec is None or self.law.period is not None or spec.delay.amplitude or not holds:
             return []
+        if spec.delay.mean == 0:
+            return []  # a relay without delay has no cycle; the flight refuses it
         h, c, p = spec.delay.mean, self.law.c, self.law.lowest
         cycle = limit_cycle(c=c, delay=h, level=p)
         figures = (

@@ -139,8 +139,9 @@ class MultilevelRelay:
                 return (sign * self.attraction_level,), memory._replace(until=end)
         s, n = self.c * y[0] + y[1], len(self.thresholds)
         bounds = (-math.inf, *(-v for v in reversed(self.thresholds)), 0.0, *self.thresholds)
-        # On a bound itself s belongs to the cell that it has come into.
-        i = bisect_left(bounds, s) if s <= memory.low else bisect_right(bounds, s)
+        # On a bound s belongs to the cell that it has come into, at first to the outer one.
+        falling = s < memory.high and (s <= memory.low or s < 0)
+        i = bisect_left(bounds, s) if falling else bisect_right(bounds, s)
         # Cells 1 .. n+1 lie below zero, n+2 .. 2n+2 above; A grows outwards.
         level = self.levels[n + 1 - i] if i <= n + 1 else -self.levels[i - n - 2]
         low, high = (*bounds, math.inf)[i - 1 : i + 1]

@@ -20,9 +20,6 @@ from spacecraft_sim.relay_system import Row, Run, State, propagate
 C, LEVEL, THRESHOLD, LEVELS = 0.31, 0.007, 0.0045, 4  # c, p, v_1, N
 DELAY, ACCURACY, DISTURBANCE = 0.2, 0.007, 0.001  # h, s; eps; amplitude of f, N m
 ATTITUDE, RATE, BENDING = 0.7, -0.01, 0.1  # start: gamma, rad; its rate, rad/s; q of mode 1, m
-FINAL = 60.0  # the end of a run over which final figures are taken, s
-SAMPLING = 0.02  # how finely the reference figures were sampled from each event on, s
-ANGLE_ROW, RATE_ROW = Row(angle=1.0), Row(rate=1.0)
 
 # (5.1) as printed; 22.335 is half of 44.67.
 PRINTED = beam.Galerkin(
@@ -143,62 +140,3 @@ def fly(case: Case) -> Flight:
     bending = np.linalg.inv(model.projection)[1, 1:] @ shapes[:n]
     rows = {"gamma": row_of(model, "attitude_z", shapes), "q": Row(modes=tuple(bending.tolist()))}
     return Flight(run=run, times=(T1, T2), unit=unit, rows=rows)
-
-
-def figures(flight: Flight) -> dict[str, tuple[float, float]]:
-    """Measures a flight twice: exactly, and as samples every 0.02 s from each event on show it.
-
-    Args:
-        flight: A flight.
-
-    Returns:
-        By name the exact figure and the sampled one.
-    """
-    run, (T1, T2), unit = flight.run, flight.times, flight.unit
-    end, rows, eps = float(run.times[-1]), flight.rows, ACCURACY * unit
-    knots = np.unique(np.r_[run.times, run.switch_times, T1, T2])
-    knots = knots[np.r_[True, np.diff(knots) > 1e-9]]  # one instant, reached by two sums
-    spans = zip(knots[:-1], knots[1:], strict=True)
-    samples = np.concatenate([*(np.arange(a, b, SAMPLING) for a, b in spans), [end]])
-    beta, v, modes = run.at(samples)
-    landing = int(np.searchsorted(samples, T2 + DELAY + 1e-9))
-    (miss,), (slip,), _ = run.at([T2 + DELAY])
-    outside = np.flatnonzero((samples >= T2) & ((abs(beta) >= eps) | (abs(v) >= eps)))
-    last, first = samples[outside[-1] + [0, 1]].tolist() if len(outside) else (T2, T2)
-    effects = run.switch_times + DELAY
-    effects = effects[effects <= end]
-    late = effects[effects > end - FINAL]
-    period = 2 * float(np.diff(late).mean())
-
-    def peak(row: Row, after: float, scale: float = 1.0) -> tuple[float, float]:
-        values = row.angle * beta + row.rate * v
-        for d, z in zip(row.modes, modes.T, strict=False):
-            values = values + 2 * (d * z).real
-        sampled = np.abs(values[samples >= after]).max()
-        return run.peak(row, after=after)[0] / scale, float(sampled) / scale
-
-    return {
-        "T1": (T1, T1),
-        "T2": (T2, T2),
-        "beta": (miss / unit, beta[landing] / unit),
-        "v": (slip / unit, v[landing] / unit),
-        "T_eps": (_entry(run, eps, last, first) - T2, first - T2),
-        "|beta|/eps": peak(ANGLE_ROW, end - FINAL, eps),
-        "|v|/eps": peak(RATE_ROW, end - FINAL, eps),
-        "|gamma|": peak(rows["gamma"], end - FINAL),
-        "|q|": peak(rows["q"], end - FINAL),
-        "max |q|": peak(rows["q"], 0.0),
-        "switches": (len(effects), len(effects)),
-        "period": (period, period),
-    }
-
-
-def _entry(run: Run, eps: float, outside: float, inside: float) -> float:
-    """The instant between the two from which |beta|, |v| < eps, s."""
-    while outside < (middle := (outside + inside) / 2) < inside:
-        (beta,), (v,), _ = run.at([middle])
-        if max(abs(beta), abs(v)) < eps:
-            inside = middle
-        else:
-            outside = middle
-    return inside

@@ -14,7 +14,7 @@ CYCLES = 10  # of the relay, shown at the end of the flight
 INK, SOFT, BAND = "#1d2430", "#6b7484", "#1f8f4d"
 # The thin line lies over the wide one: where both are seen, the plants agree.
 PLANTS = (("reduced model, one mode", "#f29b38", 3.4), ("MuJoCo", "#1f6fd6", 1.2))
-WHEN = ("whole flight", "its end")
+WHEN = ("whole flight", "end of the flight")
 # Symbol and name, signal, unit, scale, whether the accuracy is drawn as a band.
 PANELS = (
     (r"$\beta/J$, quasi-rigid angle of bus and booms", "quasi_rigid_angle_z", "mrad", 1e3, True),

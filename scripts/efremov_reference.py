@@ -4,11 +4,18 @@ An independent event-exact simulator made them, its peaks and instants sampled e
 each event on.  So an exact figure may differ in the last digit where a sampled one agrees.
 """
 
-from collections.abc import Mapping
+from collections import Counter
 from decimal import Decimal
+from itertools import pairwise
 
-# Column: unit of the law's "beta" depends on the case.  A row for each case, in the same order; a
-# figure stands as text because its last digit says how far it is known.
+import numpy as np
+from efremov_example import ACCURACY, CASES, DELAY, Flight, fly
+
+from spacecraft_sim.relay_system import Row, Run
+
+FINAL = 60.0  # the end of a run over which final figures are taken, s
+SAMPLING = 0.02  # how finely the reference figures were sampled from each event on, s
+
 COLUMNS = {
     "T1": "T1, s",
     "T2": "T2, s",
@@ -23,6 +30,7 @@ COLUMNS = {
     "switches": "switches",
     "period": "period, s",
 }
+# A row for each case, in their order.  Text, because the last digit says how far a figure is known.
 _TABLE = """
 13.3   30.9   297        -7.54     208.9  .0505 .2352 3.9e-7  2.9e-6  .1   539 .8362
 13.3   30.9   .251       -.01015   10.73  .0213 .2066 1.63e-4 3.51e-4 .118 965 .82644
@@ -47,6 +55,65 @@ MARKS = {
 }
 
 
+def figures(flight: Flight) -> dict[str, tuple[float, float]]:
+    """Measures a flight twice: exactly, and as samples every 0.02 s from each event on show it.
+
+    Args:
+        flight: A flight.
+
+    Returns:
+        By name the exact figure and the sampled one.
+    """
+    run, (T1, T2), unit = flight.run, flight.times, flight.unit
+    end, rows, eps = float(run.times[-1]), flight.rows, ACCURACY * unit
+    knots = np.unique(np.r_[run.times, run.switch_times, T1, T2])
+    knots = knots[np.r_[True, np.diff(knots) > 1e-9]]  # one instant, reached by two sums
+    pieces = (np.arange(a, b, SAMPLING) for a, b in pairwise(knots))
+    samples = np.r_[np.concatenate(list(pieces)), end]
+    beta, v, modes = run.at(samples)
+    landing = int(np.searchsorted(samples, T2 + DELAY + 1e-9))
+    (miss,), (slip,), _ = run.at([T2 + DELAY])
+    outside = np.flatnonzero((samples >= T2) & ((abs(beta) >= eps) | (abs(v) >= eps)))
+    last, first = samples[outside[-1] + [0, 1]].tolist() if len(outside) else (T2, T2)
+    effects = run.switch_times + DELAY
+    effects = effects[effects <= end]
+    late = effects[effects > end - FINAL]
+    period = 2 * float(np.diff(late).mean())
+
+    def peak(row: Row, after: float, scale: float = 1.0) -> tuple[float, float]:
+        values = row.angle * beta + row.rate * v
+        for d, z in zip(row.modes, modes.T, strict=False):
+            values = values + 2 * (d * z).real
+        sampled = np.abs(values[samples >= after]).max()
+        return run.peak(row, after=after)[0] / scale, float(sampled) / scale
+
+    return {
+        "T1": (T1, T1),
+        "T2": (T2, T2),
+        "beta": (miss / unit, beta[landing] / unit),
+        "v": (slip / unit, v[landing] / unit),
+        "T_eps": (_entry(run, eps, last, first) - T2, first - T2),
+        "|beta|/eps": peak(Row(angle=1.0), end - FINAL, eps),
+        "|v|/eps": peak(Row(rate=1.0), end - FINAL, eps),
+        "|gamma|": peak(rows["gamma"], end - FINAL),
+        "|q|": peak(rows["q"], end - FINAL),
+        "max |q|": peak(rows["q"], 0.0),
+        "switches": (len(effects), len(effects)),
+        "period": (period, period),
+    }
+
+
+def _entry(run: Run, eps: float, outside: float, inside: float) -> float:
+    """The instant between the two from which |beta|, |v| < eps, s."""
+    while outside < (middle := (outside + inside) / 2) < inside:
+        (beta,), (v,), _ = run.at([middle])
+        if max(abs(beta), abs(v)) < eps:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
 def mark(reference: str, exact: float, sampled: float) -> str:
     """Returns how a figure compares with its reference, rounded to the last digit shown.
 
@@ -64,35 +131,26 @@ def mark(reference: str, exact: float, sampled: float) -> str:
     return SAMPLED if abs(sampled - float(reference)) <= near else DIFFERS
 
 
-def marks(reference: Mapping[str, str], found: Mapping[str, tuple[float, float]]) -> dict[str, str]:
-    """Returns the mark of each figure of a case.
-
-    Args:
-        reference: Reference figures by name.
-        found: Exact and sampled figures by name.
-    """
-    return {name: mark(text, *found[name]) for name, text in reference.items()}
-
-
-def heading() -> str:
-    """Returns the heads of the columns."""
-    return " " * 10 + "".join(f"{head:>13}" for head in COLUMNS.values())
-
-
-def lines(
-    title: str, reference: Mapping[str, str], found: Mapping[str, tuple[float, float]]
-) -> str:
-    """Returns the lines of a case: title, exact figures, reference figures with their marks.
-
-    Args:
-        title: What the case is.
-        reference: Reference figures by name.
-        found: Exact and sampled figures by name.
-    """
-    verdict = marks(reference, found)
-    exact = "".join(f"{_shown(found[name][0]):>12} " for name in COLUMNS)
-    given = "".join(f"{reference[name]:>12}{verdict[name]}" for name in COLUMNS)
-    return f"{title}\n     exact{exact}\n reference{given}"
+def table() -> tuple[str, Counter[str]]:
+    """Returns the example in all its readings as text, and how often each mark is in it."""
+    text = [
+        "Efremov, Polyakov & Strygin (2006), section 5, in all its readings: exact figures, and",
+        "reference figures with a mark. beta and v in the unit of the law; |beta|/eps to |q| and",
+        "the period over the last 60 s; switchings of u after T2.",
+        "",
+        " " * 10 + "".join(f"{head:>13}" for head in COLUMNS.values()),
+    ]
+    marks = Counter()
+    for case, row in zip(CASES, REFERENCE, strict=True):
+        found = figures(fly(case))
+        marked = {name: mark(given, *found[name]) for name, given in row.items()}
+        marks.update(marked.values())
+        exact = "".join(f"{_shown(found[name][0]):>12} " for name in COLUMNS)
+        given = "".join(f"{row[name]:>12}{marked[name]}" for name in COLUMNS)
+        unit = "law in rad" if case.by_inertia else "law in kg m^2 rad"
+        text += [f"{case.title}, {unit}", f"     exact{exact}", f" reference{given}"]
+    text += [f"{m} {marks[m]:3d} figures: {meaning}" for m, meaning in MARKS.items()]
+    return "\n".join(text), marks
 
 
 def _shown(figure: float) -> str:

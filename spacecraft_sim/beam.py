@@ -43,7 +43,11 @@ class Galerkin:
 
 
 def wave_numbers(n: int) -> Array:
-    """Returns the first n roots z of cos z cosh z = -1, shape (n,)."""
+    """Returns the first n roots z of cos z cosh z = -1, shape (n,).
+
+    Args:
+        n: How many.
+    """
     # 1/cosh keeps the function bounded; the roots lie pi apart, close to (i - 1/2) pi.
     centres = (np.arange(1, n + 1) - 0.5) * np.pi
     return np.array(

@@ -42,7 +42,14 @@ class Curve:
         return Curve(self.a1, 2 * self.a2, 0.0, [(mu, mu * a) for mu, a in self.waves])
 
     def first_exit(self, tau: float, end: float, low: float, high: float) -> float | None:
-        """The first instant in (tau, end] at which the value leaves (low, high), or None."""
+        """Returns the first instant in (tau, end] at which the value leaves (low, high), or None.
+
+        Args:
+            tau: Start of the search, s.
+            end: End of the search, s.
+            low: Lower bound of the cell; -inf for none.
+            high: Upper bound of the cell; inf for none.
+        """
         down, up = 2 * self.a2 - self.ripple, 2 * self.a2 + self.ripple
         sqrt, inf = math.sqrt, math.inf
         resolution = 2e-16 * max(abs(low) if low > -inf else 0.0, abs(high) if high < inf else 0.0)

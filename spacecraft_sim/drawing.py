@@ -113,6 +113,48 @@ def draw(
     )
 
 
+def boom_points(drawing: Drawing, boom: str) -> tuple[Array, Array]:
+    """Returns where the hinges and the tip of a boom are, and where they would be without bending.
+
+    Args:
+        drawing: Shapes and motion.
+        boom: Name of the boom.
+
+    Returns:
+        Two arrays of shape (n frames, n points, 3), world frame, m.
+    """
+    bodies, turns = drawing.booms[boom], drawing.quaternions
+    end = drawing.positions[bodies[-1]] + turned(turns[bodies[-1]], drawing.tips[boom])
+    points = np.stack([*(drawing.positions[body] for body in bodies), end], axis=1)
+    reach = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(points[0], axis=0), axis=1))]
+    axis = turned(turns[bodies[0]], np.array([1.0, 0.0, 0.0]))
+    return points, points[:, :1] + reach[:, None] * axis[:, None]
+
+
+def turned(quaternion: Array, vector: Array) -> Array:
+    """Returns vectors turned by quaternions, whatever shapes broadcast.
+
+    Args:
+        quaternion: (w, x, y, z), shape (..., 4).
+        vector: Shape (..., 3).
+    """
+    w, v = quaternion[..., :1], quaternion[..., 1:]
+    turn = 2 * np.cross(v, vector)
+    return vector + w * turn + np.cross(v, turn)
+
+
+def channel_units(trajectory: Trajectory, drawing: Drawing) -> dict[str, str]:
+    """Returns the thruster channels of a flight with their units: the jets tell N from N m.
+
+    Args:
+        trajectory: The flight.
+        drawing: Its drawing.
+    """
+    names = [name for name in trajectory.signals if f"{name}_command" in trajectory.signals]
+    known = {jet.channel: "N" if np.any(jet.force) else "N m" for jet in drawing.jets}
+    return {name: known.get(name, trajectory.units[name]) for name in names}
+
+
 _KINDS = {
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",

@@ -106,6 +106,7 @@ class Guarantee:
         bound: The bound; None where each flight has its own.
         predicted: What theory expects; None where it gives the bound alone.
         assumptions: Hypotheses that the design alone decides.
+        signals: Readings that `measure` needs beside those of the law.
     """
 
     claim: str
@@ -116,6 +117,7 @@ class Guarantee:
     bound: float | None = None
     predicted: float | None = None
     assumptions: tuple[Assumption, ...] = ()
+    signals: tuple[str, ...] = ()
 
     def check(self, trajectory: Trajectory) -> Verdict:
         """Measures the claim on a trajectory.

@@ -166,8 +166,11 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
         thrusters={"mujoco": Thrusters(machine.thrusters), "reduced": thrusters},
         disturbance=disturbance,
     )
-    for name in ("mujoco", "reduced"):
-        mission.environment(name).reset()  # the start and the law's sensors must exist on both
+    for name in ("mujoco", "reduced"):  # start, sensors and what is claimed must exist on both
+        environment = mission.environment(name)
+        environment.reset()
+        for guarantee in mission.guarantees:
+            environment.physics.select(guarantee.signals)
     return mission
 
 

@@ -11,9 +11,9 @@ from matplotlib.gridspec import GridSpec
 from matplotlib.patches import FancyArrowPatch, Polygon, Rectangle
 from scipy.spatial import ConvexHull
 
-from spacecraft_sim.drawing import Drawing, Shape
+from spacecraft_sim.drawing import Drawing, Shape, boom_points, channel_units, turned
 from spacecraft_sim.guarantee import Verdict
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, moving_axes
 
 Array = np.ndarray
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
@@ -56,7 +56,8 @@ def summary(
     FigureCanvasAgg(figure)  # the figure keeps it
     rows = 1 - edges.reshape(4, 2) / height  # top and bottom of each, as shares of the page
     _heading(figure, title, verdicts, 1 - 0.36 / height)
-    late, end = _last_cycles(measured), float(measured.time[-1])
+    end = float(measured.time[-1])
+    late = min(_last_cycles(measured), float(measured.time[-min(20, len(measured.time))]))
     _film(figure, _grid(figure, rows[0], FRAMES, 0.012, 0.03), drawing, measured)
     for row, zoom in ((rows[1], False), (rows[2], True)):
         start = late if zoom else measured.time[0]
@@ -139,18 +140,8 @@ def _exaggeration(drawing: Drawing, frames: Sequence[int]) -> float:
 
 def _boom(drawing: Drawing, boom: str, frame: int) -> tuple[Array, Array]:
     """Hinges and tip of a boom, and where they were without bending, (n, 3) each, m."""
-    bodies, turns = drawing.booms[boom], drawing.quaternions
-    points = [drawing.positions[body][frame] for body in bodies]
-    points = np.array([*points, points[-1] + _turned(turns[bodies[-1]][frame], drawing.tips[boom])])
-    reach = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]
-    axis = _turned(turns[bodies[0]][frame], np.array([1.0, 0.0, 0.0]))
-    return points, points[0] + reach[:, None] * axis
-
-
-def _turned(quaternion: Array, vector: Array) -> Array:
-    """A vector turned by a (w, x, y, z) quaternion."""
-    turn = 2 * np.cross(quaternion[1:], vector)
-    return vector + quaternion[0] * turn + np.cross(quaternion[1:], turn)
+    bent, straight = boom_points(drawing, boom)
+    return bent[frame], straight[frame]
 
 
 def _craft(axes: Axes, drawing: Drawing, frame: int, factor: float) -> None:
@@ -166,7 +157,7 @@ def _craft(axes: Axes, drawing: Drawing, frame: int, factor: float) -> None:
         if shape.body in flexible:
             continue
         place, turn = drawing.positions[shape.body][frame], drawing.quaternions[shape.body][frame]
-        points = place + _turned(turn, shape.position + _turned(shape.quaternion, _surface(shape)))
+        points = place + turned(turn, shape.position + turned(shape.quaternion, _surface(shape)))
         # Joggled: a plate seen edge on has no area.
         hull = (points - centre)[ConvexHull(points[:, :2], qhull_options="QJ").vertices, :2]
         style = {"facecolor": shape.rgba[:3], "edgecolor": INK, "linewidth": 0.7}
@@ -194,8 +185,8 @@ def _arrows(axes: Axes, drawing: Drawing, measured: Trajectory, frame: int, row:
     for jet in drawing.jets:
         level = np.sign(measured[jet.channel][row])
         turn = drawing.quaternions[jet.body][frame]
-        place = drawing.positions[jet.body][frame] + _turned(turn, jet.position) - centre
-        force, torque = _turned(turn, jet.force)[:2] * level, _turned(turn, jet.torque)[2] * level
+        place = drawing.positions[jet.body][frame] + turned(turn, jet.position) - centre
+        force, torque = turned(turn, jet.force)[:2] * level, turned(turn, jet.torque)[2] * level
         style = {"color": PLUS if level > 0 else MINUS, "linewidth": 2, "zorder": 99}
         style |= {"arrowstyle": "-|>", "mutation_scale": 14, "shrinkA": 0, "shrinkB": 0}
         if np.linalg.norm(force) > 1e-9:
@@ -206,7 +197,7 @@ def _arrows(axes: Axes, drawing: Drawing, measured: Trajectory, frame: int, row:
             ends = [place[:2] + size * np.array([0.75 * way * x, 0.65]) for x in (1, -1)]
             style["connectionstyle"] = f"arc3,rad={0.45 * way}"
             axes.add_patch(FancyArrowPatch(*ends, **style))
-    channels = _channels(measured, drawing)
+    channels = channel_units(measured, drawing)
     on = [f"{measured[c][row]:+.3g} {unit}" for c, unit in channels.items() if measured[c][row]]
     return ", ".join(on) if 0 < len(on) < 3 else f"{len(on)} thrusters on" if on else "thrust off"
 
@@ -241,7 +232,7 @@ def _histories(
     axes: Axes, flights: Flights, kind: str, also: float = 0.0
 ) -> tuple[float, float, str]:
     """Draws the moving axes; returns their peak and a unit that suits it and `also`, with name."""
-    moving = _moving_axes(flights[1], kind)
+    moving = moving_axes(flights[1], kind)
     peak = max((_peak(flights[1][f"{kind}_{axis}"]) for axis in moving), default=0.0)
     scale, prefix = _prefix(max(peak, also))
     for axis, dashes in zip(moving, ("-", "--", ":"), strict=False):
@@ -268,7 +259,7 @@ def _tips(axes: Axes, flights: Flights, booms: Sequence[str], zoom: bool) -> Non
 
 
 def _phase_plane(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
-    axis = next(iter(_moving_axes(flights[1], "quasi_rigid_angle")), "")
+    axis = next(iter(moving_axes(flights[1], "quasi_rigid_angle")), "")
     x, y = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
     if not all(signal in flights[1].signals for signal in (x, y)):
         return _panel(axes, f"Phase plane, {WHEN[zoom]}", "not recorded", "")
@@ -286,7 +277,7 @@ def _phase_plane(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
 
 def _thrust(axes: Axes, measured: Trajectory, drawing: Drawing, span: tuple[float, float]) -> None:
     """A lane for each channel, on a logarithmic scale of the levels of both signs."""
-    channels, ticks = _channels(measured, drawing), {}
+    channels, ticks = channel_units(measured, drawing), {}
     for k, channel in enumerate(channels):
         levels = np.unique(np.abs(measured[channel][measured[channel] != 0]))
         height, middle = _log_heights(levels), -2.4 * k
@@ -359,7 +350,7 @@ def _since(flight: Trajectory, start: float) -> Trajectory:
 def _settled(measured: Trajectory) -> float:
     """When the quasi-rigid angle is last beyond a twentieth of its peak, s."""
     last, times = float(measured.time[-1]), [0.0]
-    for axis in _moving_axes(measured, "quasi_rigid_angle")[:1]:
+    for axis in moving_axes(measured, "quasi_rigid_angle")[:1]:
         angle = np.abs(measured[f"quasi_rigid_angle_{axis}"])
         times += measured.time[angle > 0.05 * angle.max()].tolist()
     return min(times[-1] or last / 2, 0.8 * last)
@@ -376,21 +367,6 @@ def _last_cycles(measured: Trajectory, cycles: int = 10) -> float:
 
 def _peak(value: Array) -> float:
     return float(np.abs(value).max(initial=0.0))
-
-
-def _moving_axes(flight: Trajectory, kind: str) -> list[str]:
-    """Axes of a vector signal that move at all, the most moving first."""
-    signals = {axis: f"{kind}_{axis}" for axis in "xyz"}
-    peaks = {axis: _peak(flight[s]) for axis, s in signals.items() if s in flight.signals}
-    least = 1e-3 * max(peaks.values(), default=0.0)
-    return sorted((a for a in peaks if peaks[a] >= least), key=lambda axis: -peaks[axis])
-
-
-def _channels(flight: Trajectory, drawing: Drawing) -> dict[str, str]:
-    """Thruster channels with their units: N or N m, where the jets tell which it is."""
-    names = [name for name in flight.signals if f"{name}_command" in flight.signals]
-    known = {jet.channel: "N" if np.any(jet.force) else "N m" for jet in drawing.jets}
-    return {name: known.get(name, flight.units[name]) for name in names}
 
 
 def _prefix(peak: float) -> tuple[float, str]:

@@ -10,9 +10,9 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from spacecraft_sim.drawing import Drawing, Jet, Shape
+from spacecraft_sim.drawing import Drawing, Jet, Shape, boom_points, channel_units, turned
 from spacecraft_sim.guarantee import Verdict
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, moving_axes
 
 Array = np.ndarray
 Stream = rr.RecordingStream
@@ -95,7 +95,7 @@ def _solid(kind: str, shapes: Sequence[Shape]) -> rr.AsComponents:
     }
     if kind in ("capsule", "sphere"):  # a sphere is a capsule of no length
         # A capsule starts at its origin here; MuJoCo's origin is its middle.
-        start = centre - size[:, 1:2] * _turned(turn, np.array([0.0, 0.0, 1.0]))
+        start = centre - size[:, 1:2] * turned(turn, np.array([0.0, 0.0, 1.0]))
         return rr.Capsules3D(radii=radius, lengths=length, translations=start, **look)
     if kind == "cylinder":
         return rr.Cylinders3D(radii=radius, lengths=length, centers=centre, **look)
@@ -109,7 +109,7 @@ def _motion(stream: Stream, drawing: Drawing) -> None:
     turns = {body: np.roll(q, -1, axis=1) for body, q in drawing.quaternions.items()}
     lines = {}
     for boom in drawing.booms:
-        points, straight = _boom_points(drawing, boom)
+        points, straight = boom_points(drawing, boom)
         lines[f"unbent/{boom}"] = straight[:, [0, -1]]
         lines[f"bending/{boom}"] = straight + EXAGGERATION * (points - straight)
     for path in lines:
@@ -128,27 +128,10 @@ def _motion(stream: Stream, drawing: Drawing) -> None:
         stream.flush()
 
 
-def _boom_points(drawing: Drawing, boom: str) -> tuple[Array, Array]:
-    """Hinges and tip of a boom, and where they were without bending, (n, n_points, 3) each, m."""
-    bodies, turns = drawing.booms[boom], drawing.quaternions
-    end = drawing.positions[bodies[-1]] + _turned(turns[bodies[-1]], drawing.tips[boom])
-    points = np.stack([*(drawing.positions[body] for body in bodies), end], axis=1)
-    reach = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(points[0], axis=0), axis=1))]
-    axis = _turned(turns[bodies[0]], np.array([1.0, 0.0, 0.0]))
-    return points, points[:, :1] + reach[:, None] * axis[:, None]
-
-
-def _turned(quaternion: Array, vector: Array) -> Array:
-    """A vector turned by (w, x, y, z) quaternions, shape (n, 3)."""
-    w, v = quaternion[:, :1], quaternion[:, 1:]
-    turn = 2 * np.cross(v, vector)
-    return vector + w * turn + np.cross(v, turn)
-
-
 def _extent(drawing: Drawing) -> float:
     """Distance of the farthest body origin or boom tip from the first body, m."""
     origins = np.array([position[0] for position in drawing.positions.values()])
-    tips = [_boom_points(drawing, boom)[0][0, -1] for boom in drawing.booms]
+    tips = [boom_points(drawing, boom)[0][0, -1] for boom in drawing.booms]
     return float(np.linalg.norm(np.array([*origins, *tips]) - origins[0], axis=1).max()) or 1.0
 
 
@@ -198,7 +181,7 @@ def _signals(stream: Stream, flights: Flights, booms: Sequence[str], band: float
     """Angles, rates and tips of both plants; the quasi-rigid angle over the accuracy too."""
     predicted, measured = flights
     kinds = ("quasi_rigid_angle", "attitude", "quasi_rigid_rate", "rate")
-    rows = [(k, a, f"{k}_{a}", AXES[a], 0) for k in kinds for a in _moving_axes(measured, k)]
+    rows = [(k, a, f"{k}_{a}", AXES[a], 0) for k in kinds for a in moving_axes(measured, k)]
     rows += [("tips", b, f"{b}_tip_y", BOOMS[k % 3], k) for k, b in enumerate(booms)]
     for view, name, signal, (full, reduced), k in rows:
         # Paths are drawn in the order of their names.  Booms often swing alike: the later ones are
@@ -230,7 +213,7 @@ def _plot(stream: Stream, path: str, time: Array, value: Array, style: rr.Series
 
 def _thrust(stream: Stream, measured: Trajectory, drawing: Drawing) -> None:
     """Commanded and delivered thrust: as plots and as lanes of states."""
-    for channel, unit in _channels(measured, drawing).items():
+    for channel, unit in channel_units(measured, drawing).items():
         for what, end, color in (("command", "_command", GREY), ("delivered", "", AMBER)):
             value = measured[f"{channel}{end}"]
             time, value = measured.time[_changes(value)], value[_changes(value)]
@@ -258,7 +241,7 @@ def _lane(stream: Stream, path: str, time: Array, value: Array, unit: str) -> No
 
 def _phase_plane(stream: Stream, path: str, flights: Flights, start: float) -> None:
     """Angle against rate, each over its largest value: the view has equal axes and y down."""
-    axis = next(iter(_moving_axes(flights[1], "quasi_rigid_angle")), "")
+    axis = next(iter(moving_axes(flights[1], "quasi_rigid_angle")), "")
     names = [f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"]
     if not all(name in flight.signals for flight in flights for name in names):
         return
@@ -294,25 +277,10 @@ def _throttle(value: Array) -> Array:
     return np.sign(value) * (0.4 + 0.6 * share if most > least else 1.0)
 
 
-def _moving_axes(flight: Trajectory, kind: str) -> list[str]:
-    """Axes of a vector signal that move at all, the most moving first."""
-    signals = {axis: flight.signals.get(f"{kind}_{axis}") for axis in "xyz"}
-    peaks = {axis: float(np.abs(x).max()) for axis, x in signals.items() if x is not None}
-    least = 1e-3 * max(peaks.values(), default=0.0)
-    return sorted((a for a in peaks if peaks[a] >= least), key=lambda axis: -peaks[axis])
-
-
-def _channels(flight: Trajectory, drawing: Drawing) -> dict[str, str]:
-    """Thruster channels with their units: N or N m, where the jets tell which it is."""
-    names = [name for name in flight.signals if f"{name}_command" in flight.signals]
-    known = {jet.channel: "N" if np.any(jet.force) else "N m" for jet in drawing.jets}
-    return {name: known.get(name, flight.units[name]) for name in names}
-
-
 def _events(stream: Stream, measured: Trajectory, drawing: Drawing, verdicts: Verdicts) -> None:
     """Changes of command and thrust, and the instants that decided the verdicts."""
     events = []
-    for channel, unit in _channels(measured, drawing).items():
+    for channel, unit in channel_units(measured, drawing).items():
         for signal, word in ((f"{channel}_command", "command"), (channel, "thrust")):
             for row in _changes(measured[signal]):
                 text = f"{channel}: {word} {measured[signal][row]:+.4g} {unit}"

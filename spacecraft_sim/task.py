@@ -132,12 +132,15 @@ class ControlTask(control.Task):
         """
         disturbance, period = self._disturbance, self._controller.period
         t = physics.time()
+        probe = _PROBE * (end - t)
         while t < end:
             sample = math.inf if period is None else self._samples * period
             jump = disturbance.next_edge(t)
             stop = min(
                 end, self._edge, sample, jump, t + disturbance.longest, _foreseen(self._trace)
             )
+            if period is None and len(self._trace) == 1:
+                stop = min(stop, t + probe)
             torque, rate = disturbance.line(t, stop)
             value, rates = self._thrust + torque, self._slope + rate
             physics.begin(value, rates)
@@ -245,6 +248,8 @@ class ControlTask(control.Task):
 
 Point = tuple[float, float]  # time, least event function
 WIDTH = 1e-11  # to which a switching instant is located, s
+_PROBE = 0.05  # share of a control step after which a new smooth stretch is looked at first: it
+# gives the slope by which a dip across zero and back is suspected, and a crossing foreseen
 
 
 def _foreseen(points: Sequence[Point]) -> float:

@@ -140,3 +140,16 @@ def peak(time: Array, value: Array, rate: Array) -> tuple[float, float]:
     times, values = np.r_[time, (time[:-1] + s * span).ravel()], np.r_[np.abs(value), inner.ravel()]
     worst = int(np.argmax(values))
     return float(values[worst]), float(times[worst])
+
+
+def moving_axes(trajectory: Trajectory, kind: str) -> list[str]:
+    """Returns the axes of a vector signal that move at all, the most moving first.
+
+    Args:
+        trajectory: The flight.
+        kind: Name of the signal without its axis, such as `attitude`.
+    """
+    signals = {axis: trajectory.signals.get(f"{kind}_{axis}") for axis in "xyz"}
+    peaks = {axis: float(np.abs(x).max()) for axis, x in signals.items() if x is not None}
+    least = 1e-3 * max(peaks.values(), default=0.0)
+    return sorted((a for a in peaks if peaks[a] >= least), key=lambda axis: -peaks[axis])

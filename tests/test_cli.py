@@ -28,9 +28,8 @@ SHORT = ("duration=2.0",)
 
 
 def run(out, *settings, name=NAME):
-    return cli.main(
-        ["run", str(name), "--out", str(out), *(["--set", *settings] if settings else [])]
-    )
+    changes = ["--set", *settings] if settings else []
+    return cli.main(["run", str(name), "--out", str(out), *changes])
 
 
 @pytest.fixture(scope="module")

@@ -50,7 +50,7 @@ curves = st.builds(Curve, coefficient, coefficient, coefficient, st.lists(wave, 
 room = st.one_of(st.floats(1e-9, 2), st.just(INF))
 
 
-@settings(max_examples=1000000)
+@settings(max_examples=20000)
 @given(curves, room, room, st.floats(0.05, 4))
 @example(Curve(0.0, 0.0, 0.0, []), 1.0, 1.0, 1.0)
 @example(Curve(0.0, -1.0, 1.0, []), 0.25, INF, 4.0)  # touches the bound at 1/2
@@ -79,7 +79,7 @@ def test_first_exit_is_the_first_and_lies_on_a_bound(curve, below, above, end):
         assert found <= brute + 2 * near / abs(rate)
 
 
-@settings(max_examples=10000)
+@settings(max_examples=200)
 @given(curves, st.floats(0.05, 4), st.floats(0.01, 0.99))
 def test_an_exit_whose_time_is_known_is_found(curve, end, share):
     # The bound is put where the curve first reaches its value at a chosen instant.
