@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from controllers import efremov
+from controllers import efremov, efremov_observer
 from spacecraft_sim.controller import Controller
 from spacecraft_sim.guarantee import Guarantee
 
@@ -11,4 +11,5 @@ Design = Callable[..., tuple[Controller, tuple[Guarantee, ...]]]  # (model, thru
 REGISTRY: dict[str, Design] = {
     "efremov_local": efremov.design_local,
     "efremov_nonlocal": efremov.design_nonlocal,
+    "efremov_observed": efremov_observer.design_observed,
 }

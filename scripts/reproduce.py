@@ -10,12 +10,9 @@ import argparse
 import sys
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parent))  # the modules beside this one, however it is loaded
-
-import efremov_figure as figure
-import efremov_reference as reference
-
 from spacecraft_sim import drawing, mission, record, run_folder
+from support import efremov_figure as figure
+from support import efremov_reference as reference
 
 SCENARIO = "efremov-nonlocal"  # the authors' boom under the law of Theorem 2
 

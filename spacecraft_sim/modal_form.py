@@ -1,5 +1,7 @@
 """Reduced model -> relay system: complex modes, and readings as rows over them."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from spacecraft_sim.reduced import ReducedModel
@@ -67,6 +69,27 @@ def modal_form(
         raise ValueError("an elastic mode is overdamped; the modal form needs conjugate pairs")
     drive = (np.linalg.inv(vectors) @ np.r_[np.zeros(k), B[1:]])[upper] / B[0]
     return tuple(values[upper].tolist()), tuple(drive.tolist()), vectors[:, upper]
+
+
+def real_form(system: RelaySystem, rows: Sequence[Row]) -> tuple[Array, Array, Array]:
+    """Returns A, b, C of x' = A x + b u, y = C x over x = (beta, beta', Re z_1, Im z_1, ...).
+
+    Args:
+        system: The system.
+        rows: The rows of C.
+    """
+    n = 2 + 2 * len(system.eigenvalues)
+    A, b, C = np.zeros((n, n)), np.zeros(n), np.zeros((len(rows), n))
+    A[0, 1], b[1] = 1.0, 1.0
+    for k, (x, g) in enumerate(zip(system.eigenvalues, system.drive, strict=True)):
+        i = slice(2 + 2 * k, 4 + 2 * k)
+        A[i, i] = [[x.real, -x.imag], [x.imag, x.real]]
+        b[i] = g.real, g.imag
+    for i, row in enumerate(rows):
+        C[i, :2] = row.angle, row.rate
+        for k, d in enumerate(row.modes):
+            C[i, 2 + 2 * k : 4 + 2 * k] = 2 * d.real, -2 * d.imag
+    return A, b, C
 
 
 def row_of(model: ReducedModel, reading: str, shapes: Array) -> Row:

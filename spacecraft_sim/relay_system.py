@@ -230,7 +230,7 @@ def propagate(
             tau = found
             cell = relay.next(cell, curve(tau)[1])
             end = min(end, issue(t + tau, cell))
-        x = _moved(system, x, acceleration, end - t)
+        x = moved(system, x, acceleration, end - t)
         t = end
         times.append(t)
         inputs.append(acceleration)
@@ -343,8 +343,15 @@ def _curve(
     )
 
 
-def _moved(system: RelaySystem, x: State, acceleration: float, tau: float) -> State:
-    """The state after a time under constant acceleration."""
+def moved(system: RelaySystem, x: State, acceleration: float, tau: float) -> State:
+    """Returns the state after a time under constant acceleration.
+
+    Args:
+        system: The system.
+        x: State at the start.
+        acceleration: u + f, rad/s^2.
+        tau: The time, s.
+    """
     modes = []
     for z, exponent, b in zip(x.modes, system.eigenvalues, system.drive, strict=True):
         at_rest = -b * acceleration / exponent

@@ -5,7 +5,9 @@ Each test shows that the corrected statement holds and that the printed one does
 
 import itertools
 import math
+import re
 from collections import deque
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,12 +44,12 @@ def pulsed(beta, v, sign, T1, T2, *, U=1.0, delay=0.0):
     return float(angle[0]), float(rate[0])
 
 
-def held(law, *, delay, start, duration, acting=0.0):
+def held(law, *, delay, start, duration):
     """The law of a design on beta'' = u, from t = 0 on."""
     system = RelaySystem(
         switching=Row(angle=law.c, rate=1.0), thresholds=law.thresholds, levels=law.levels
     )
-    return propagate(system, start=start, duration=duration, delay=delay, acting=acting)
+    return propagate(system, start=start, duration=duration, delay=delay)
 
 
 # -- section 2: attraction ---------------------------------------------------------------------
@@ -390,3 +392,9 @@ def test_19_the_listed_boom_leaves_small_deflections():
     assert off["listed"] > 0.02
     assert reach["authors'"] < 0.06
     assert drawn_in["authors'"] < 0.005
+
+
+def test_the_list_names_the_tests():
+    text = (Path(__file__).parent.parent / "controllers" / "ERRATA.md").read_text(encoding="utf-8")
+    proofs = {name for name in globals() if re.match(r"test_\d\d", name)}
+    assert set(re.findall(r"tests/test_errata\.py::(\w+)", text)) == proofs

@@ -28,7 +28,14 @@ PRINTED = beam.Galerkin(
 
 
 def boom(density: float, stiffness: float, damping_time: float, modes: int = 1) -> beam.Galerkin:
-    """Returns the coefficients of the example's bus with given booms."""
+    """Returns the coefficients of the example's bus with given booms.
+
+    Args:
+        density: Mass per length, kg/m.
+        stiffness: EI, N m^2.
+        damping_time: chi, s.
+        modes: Number of cantilever modes.
+    """
     return beam.galerkin(
         bus_inertia=30.0,
         root_radius=3.0,

@@ -9,14 +9,18 @@ import scipy.linalg
 from scipy.integrate import solve_ivp
 
 from spacecraft_sim import beam, reduced
-from spacecraft_sim.modal_form import system_of
+from spacecraft_sim.modal_form import real_form, system_of
 from spacecraft_sim.relay_system import RelaySystem, Run, State, propagate
 
 C, LEVEL, DELAY, DURATION, ANGLE = 0.31, 0.007, 0.3664, 100.0, 0.001
 
 
 def system(modes: int = 1) -> RelaySystem:
-    """Returns the case with the given number of Galerkin modes of the authors' booms."""
+    """Returns the case with some Galerkin modes of the authors' booms.
+
+    Args:
+        modes: How many.
+    """
     coefficients = beam.galerkin(
         bus_inertia=30.0,
         root_radius=3.0,
@@ -32,27 +36,25 @@ def system(modes: int = 1) -> RelaySystem:
 
 
 def exact(case: RelaySystem, duration: float = DURATION) -> Run:
-    """Propagates the case from event to event."""
+    """Propagates the case from event to event.
+
+    Args:
+        case: The system.
+        duration: Length of the run, s.
+    """
     start = State(ANGLE, 0.0, (0j,) * len(case.eigenvalues))
     return propagate(case, start=start, duration=duration, delay=DELAY)
 
 
-def matrices(case: RelaySystem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns real A, b, c of x' = A x + b u, s = c x, with x = (beta, v, Re z, Im z, ...)."""
-    n = 2 + 2 * len(case.eigenvalues)
-    A, b, c = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    A[0, 1], b[1], c[:2] = 1.0, 1.0, (case.switching.angle, case.switching.rate)
-    rows = zip(case.eigenvalues, case.drive, case.switching.modes, strict=True)
-    for k, (x, g, d) in enumerate(rows):
-        i = slice(2 + 2 * k, 4 + 2 * k)
-        A[i, i] = [[x.real, -x.imag], [x.imag, x.real]]
-        b[i], c[i] = (g.real, g.imag), (2 * d.real, -2 * d.imag)
-    return A, b, c
-
-
 def adaptive(case: RelaySystem, *, rtol: float, duration: float = DURATION) -> np.ndarray:
-    """Propagates by DOP853, stopped at every effect and at every zero of s; switching times."""
-    A, b, c = matrices(case)
+    """Propagates by DOP853, stopped at every effect and every zero of s; returns the switchings.
+
+    Args:
+        case: The system.
+        rtol: Relative tolerance.
+        duration: Length of the run, s.
+    """
+    A, b, (c,) = real_form(case, [case.switching])
     x, t, u, pending, switches = np.zeros(len(b)), 0.0, 0.0, [], []
     x[0] = ANGLE
     sign = 1.0
@@ -80,8 +82,14 @@ def adaptive(case: RelaySystem, *, rtol: float, duration: float = DURATION) -> n
 
 
 def fixed_step(case: RelaySystem, *, dt: float, duration: float = DURATION) -> np.ndarray:
-    """Propagates by the exact map of a fixed step with a ring buffer of commands."""
-    A, b, c = matrices(case)
+    """Propagates by the exact map of a fixed step, a ring buffer of commands; returns switchings.
+
+    Args:
+        case: The system.
+        dt: Step, s.
+        duration: Length of the run, s.
+    """
+    A, b, (c,) = real_form(case, [case.switching])
     n = len(b)
     joint = np.zeros((n + 1, n + 1))
     joint[:n, :n], joint[:n, n] = A * dt, b * dt

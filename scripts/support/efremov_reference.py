@@ -9,9 +9,10 @@ from decimal import Decimal
 from itertools import pairwise
 
 import numpy as np
-from efremov_example import ACCURACY, CASES, DELAY, Flight, fly
 
+from controllers.efremov import limit_cycle
 from spacecraft_sim.relay_system import Row, Run
+from support.efremov_example import ACCURACY, CASES, DELAY, LEVEL, C, Flight, fly
 
 FINAL = 60.0  # the end of a run over which final figures are taken, s
 SAMPLING = 0.02  # how finely the reference figures were sampled from each event on, s
@@ -149,6 +150,13 @@ def table() -> tuple[str, Counter[str]]:
         given = "".join(f"{row[name]:>12}{marked[name]}" for name in COLUMNS)
         unit = "law in rad" if case.by_inertia else "law in kg m^2 rad"
         text += [f"{case.title}, {unit}", f"     exact{exact}", f" reference{given}"]
+    cycle = limit_cycle(c=C, delay=DELAY, level=LEVEL)
+    text += [
+        "without disturbance, in closed form (law in rad): "
+        f"|beta|/eps {cycle.beta_max / ACCURACY:.6g}, |v|/eps {cycle.v_max / ACCURACY:.6g}, "
+        f"period {cycle.period:.6g} s",
+        "",
+    ]
     text += [f"{m} {marks[m]:3d} figures: {meaning}" for m, meaning in MARKS.items()]
     return "\n".join(text), marks
 

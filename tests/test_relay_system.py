@@ -1,0 +1,342 @@
+"""Relay systems: the figures of the paper, high precision, other integrators, a second simulator."""
+
+import importlib.util
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from controllers.efremov import MultilevelRelay, attracting, limit_cycle
+from spacecraft_sim import beam
+from spacecraft_sim.delay import Delay
+from spacecraft_sim.disturbance import Disturbance, Torque
+from spacecraft_sim.modal_form import modal_form, row_of, system_of
+from spacecraft_sim.reduced import (
+    ReducedPhysics,
+    double_integrator,
+    galerkin_model,
+    galerkin_start,
+)
+from spacecraft_sim.relay_system import RelaySystem, Row, State, propagate
+from spacecraft_sim.scenario import Initial
+from spacecraft_sim.simulate import Environment, simulate
+from spacecraft_sim.spacecraft import Thruster
+from spacecraft_sim.task import ControlTask
+from spacecraft_sim.thrusters import Thrusters
+
+ANGLE, RATE = "quasi_rigid_angle_z", "quasi_rigid_rate_z"
+# Section 5 of Efremov et al. 2006: one mode, five levels, per unit of inertia.
+PRINTED = beam.Galerkin(J=1183.24, p=[22.335], a=[11.06], b=[0.72], c=[38.83])
+PRINTED = beam.Galerkin(**{k: np.asarray(getattr(PRINTED, k)) for k in ("J", "p", "a", "b", "c")})
+THRESHOLDS = tuple(0.0045 * 3**i for i in range(4))
+LEVELS = tuple(0.007 * 3**k for k in range(5))
+RIGID = RelaySystem(switching=Row(angle=0.31, rate=1.0), levels=(0.007,))
+
+
+def script(name):
+    path = Path(__file__).parents[1] / "scripts" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(f"script_{name}", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+RIVALS = script("relay_rivals")
+
+
+def at_rest(system, angle=0.001):
+    return State(angle, 0.0, (0j,) * len(system.eigenvalues))
+
+
+def multilevel(system):
+    """The same plant under the five levels of section 5."""
+    return RelaySystem(
+        switching=system.switching, thresholds=THRESHOLDS, levels=LEVELS,
+        eigenvalues=system.eigenvalues, drive=system.drive,
+    )  # fmt: skip
+
+
+def adaptive(system, *, start, duration, arrive, force=lambda t: 0.0, breaks=(), pending=(), u=0.0):
+    """DOP853 from effect to effect, stopped at every bound of s: switchings and final state."""
+    A, b, c = RIVALS.matrices(system)
+    z = [part for mode in start.modes for part in (mode.real, mode.imag)]
+    x, t, queue, switches = np.array([start.angle, start.rate, *z]), 0.0, list(pending), []
+    bounds = [*(-v for v in system.thresholds[::-1]), 0.0, *system.thresholds]
+    levels = [*system.levels[::-1], *(-p for p in system.levels)]
+    cell = sum(bound <= c @ x for bound in bounds)
+    fresh = True
+    while t < duration:
+        if fresh:
+            switches.append(t)
+            queue.append((arrive(t), levels[cell]))
+        end = min(duration, *(q[0] for q in queue[:1]), *(x for x in breaks if x > t))
+        events = []
+        for side, k in ((1.0, cell - 1), (-1.0, cell)):
+            if 0 <= k < len(bounds):
+                event = lambda _, y, side=side, bound=bounds[k]: side * (c @ y - bound)  # noqa: E731
+                event.terminal, event.direction, event.step = True, -1, -int(side)
+                events.append(event)
+        found = solve_ivp(
+            lambda t, y, u=u: A @ y + b * (u + force(t)), (t, end), x, "DOP853",
+            events=events, rtol=1e-12, atol=1e-17, max_step=0.5,
+        )  # fmt: skip
+        t, x = float(found.t[-1]), found.y[:, -1]
+        if fresh := found.status == 1:
+            (hit,) = [e for e, times in zip(events, found.t_events, strict=True) if len(times)]
+            cell += hit.step
+        while queue and queue[0][0] <= t:
+            u = queue.pop(0)[1]
+    return np.array(switches), x
+
+
+def final(run):
+    """The real state (beta, v, Re z, Im z, ...) at the end of a run."""
+    angle, rate, modes = run.at([run.times[-1]])
+    return np.r_[angle, rate, np.c_[modes[0].real, modes[0].imag].ravel()]
+
+
+# -- figures -----------------------------------------------------------------------------------
+
+
+def section_5():
+    """The system, the start and the pulses of the paper's run, recomputed for its own plant."""
+    model = galerkin_model(PRINTED, torques={"u": 1.0}, tips={})
+    feedback = {ANGLE: 0.31, RATE: 1.0}
+    system = system_of(model, channel="u", switching=feedback, thresholds=THRESHOLDS, levels=LEVELS)
+    _, _, shapes = modal_form(model, "u")
+    initial = Initial(attitude=(0, 0, 0.7), rate=(0, 0, -0.01), boom_amplitude=0.1)
+    position, velocity = galerkin_start(1)(initial)
+    q, w = model.projection @ position, model.projection @ velocity
+    z = np.linalg.solve(np.c_[shapes, shapes.conj()], np.r_[q[1:], w[1:]])[0]
+    return model, system, shapes, State(float(q[0]), float(w[0]), (complex(z),))
+
+
+def test_run_of_section_5():
+    model, system, shapes, start = section_5()
+    U = 1 / PRINTED.J
+    pulses = attracting(start.angle, start.rate, U)
+    assert pulses[1:] == pytest.approx((18.213196, 48.258792), abs=1e-6)  # as many digits as given
+    run = propagate(
+        system, start=start, duration=80.0, delay=0.2, feedback_from=pulses.T2,
+        pending=[(0.2, pulses.sign * U), (pulses.T1 + 0.2, -pulses.sign * U)],
+        disturbance=Torque(amplitude=0.001 / PRINTED.J, frequency=1.0),
+    )  # fmt: skip
+    expected = [48.458792, 48.744239, 49.167736, 49.572396, 49.993393, 50.400048]
+    # Figures of another simulator, rounded to 1e-6 s; the plant's constants carry five digits.
+    assert run.switch_times[:6] + 0.2 == pytest.approx(expected, abs=1e-5)
+    angle, rate, modes = run.at([80.0])
+
+    def reading(row):
+        return row.angle * angle[0] + row.rate * rate[0] + 2 * (row.modes @ modes[0]).real
+
+    gamma = reading(row_of(model, "attitude_z", shapes))
+    q = (angle[0] - gamma) * PRINTED.J / (2 * PRINTED.p[0])
+    # Rounded to 1e-9, and sensitive to the fifth digit of the constants.
+    found = (gamma, q, angle[0], rate[0])
+    expected = (-2.517972e-4, 2.953926e-3, -1.402798e-4, 3.587988e-4)
+    assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_limit_cycle_figures():
+    run = propagate(RIGID, start=State(0.001, 0.0), duration=400.0, delay=0.2)
+    late = run.switch_times[run.switch_times > 300]
+    figures = (
+        2 * np.diff(late),
+        run.peak(Row(rate=1.0), after=300.0)[0],
+        run.peak(Row(angle=1.0), after=300.0)[0],
+    )
+    exact = limit_cycle(c=0.31, delay=0.2, level=0.007)
+    # The transient is gone (e^(-.31 x 300)); a clock of 400 s has 6e-14 s, 1e-13 of a period; beta
+    # of 1.5e-4 gathers the rounding of a start of 1e-3 over 1000 switchings.
+    for found, value in zip(figures, exact, strict=True):
+        assert found == pytest.approx(value, rel=1e-11)
+    # Ten digits of Efremov et al. 2006, closed form.
+    assert exact == pytest.approx((0.826439232, 1.446268657e-3, 1.494066448e-4), rel=1e-9)
+
+
+# -- high precision ----------------------------------------------------------------------------
+
+
+def high_precision(case, duration):
+    """The rivals' case with 40 digits: a scan of s in small steps, then Newton by secants."""
+    mp = mpmath.mp
+    c, p, h = mp.mpf(RIVALS.C), mp.mpf(RIVALS.LEVEL), mp.mpf(RIVALS.DELAY)
+    lam, b, d = (mp.mpc(x) for x in (case.eigenvalues[0], case.drive[0], case.switching.modes[0]))
+    ca, cv = mp.mpf(case.switching.angle), mp.mpf(case.switching.rate)
+    assert float(c) == pytest.approx(float(ca), rel=1e-14)  # the row is the one meant, to rounding
+    t, beta, v, z, u = mp.mpf(0), mp.mpf(RIVALS.ANGLE), mp.mpf(0), mp.mpc(0), mp.mpf(0)
+    queue, switches, sign = [(h, -p)], [mp.mpf(0)], 1
+    while t < duration:
+        end = min(queue[0][0], mp.mpf(duration)) if queue else mp.mpf(duration)
+
+        def moved(tau, beta=beta, v=v, z=z, u=u):
+            rest = -b * u / lam
+            return (
+                beta + tau * (v + tau * u / 2), v + tau * u, rest + (z - rest) * mp.exp(lam * tau)
+            )  # fmt: skip
+
+        def s(tau, moved=moved):
+            x = moved(tau)
+            return ca * x[0] + cv * x[1] + 2 * (d * x[2]).real
+
+        n = max(1, math.ceil((end - t) / mp.mpf("0.02")))
+        grid = [(end - t) * k / n for k in range(n + 1)]
+        values = [s(tau) for tau in grid]
+        for (x0, s0), (x1, s1) in pairwise(zip(grid, values, strict=True)):
+            if s0 * sign > 0 >= s1 * sign:
+                root = mpmath.findroot(s, (x0, x1), solver="anderson", tol=mp.mpf(10) ** -60)
+                sign = -sign
+                switches.append(t + root)
+                queue.append((t + root + h, -sign * p))
+                end = min(end, queue[0][0])
+        beta, v, z = moved(end - t)
+        t = end
+        while queue and queue[0][0] <= t:
+            u = queue.pop(0)[1]
+    return switches
+
+
+def test_switching_times_against_forty_digits():
+    case = RIVALS.system()
+    run = RIVALS.exact(case)
+    with mpmath.workdps(40):
+        exact = high_precision(case, RIVALS.DURATION)
+        assert len(run.switch_times) == len(exact) == 130  # the first command and 129 switchings
+        error = max(abs(a - b) for a, b in zip(run.switch_times.tolist(), exact, strict=True))
+    # A clock of 100 s has 1.4e-14 s; the rounding of 129 segments adds up to a few dozen of them.
+    assert error < 1e-12
+
+
+# -- other integrators -------------------------------------------------------------------------
+
+
+def delays():
+    yield "constant", 0.3664, lambda t: t + 0.3664
+    wave = Delay(mean=0.3, amplitude=0.15, frequency=3.0, phase=0.7)
+    yield "sinusoidal", wave, wave.arrival
+
+    def sum_of_two(t):
+        return 0.3 + 0.08 * math.sin(2 * t) + 0.05 * math.sin(5 * t + 1)
+
+    def arrive(t):
+        a = t + 0.3
+        for _ in range(200):  # contracts by h' <= .41 a time: 200 leave nothing
+            a = t + sum_of_two(a)
+        return a
+
+    yield "callable", sum_of_two, arrive
+
+
+DELAYS = {name: rest for name, *rest in delays()}
+SINE = Torque(constant=2e-4, amplitude=5e-4, frequency=1.3, phase=0.4)
+STEPS = ((0.0, 3e-4), (7.3, -6e-4), (21.0, 1e-4))
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize("modes", [0, 1, 3])
+def test_against_adaptive_integration(modes, delay):
+    system = multilevel(RIVALS.system(modes) if modes else RIGID)
+    start = at_rest(system, 0.03)._replace(rate=0.01)
+    given, arrive = DELAYS[delay]
+    run = propagate(system, start=start, duration=20.0, delay=given)
+    switches, x = adaptive(system, start=start, duration=20.0, arrive=arrive)
+    assert len(run.switch_times) == len(switches) > 20
+    # rtol 1e-12 of a state of .03 over rates of s of 1e-3 and 20 s: some 1e-10 s (rivals' script).
+    assert run.switch_times == pytest.approx(switches, abs=1e-9)
+    assert final(run) == pytest.approx(x, abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("torque", "steps"),
+    [
+        (Torque(constant=4e-4), ()),
+        (SINE, ()),
+        (None, STEPS),
+        (SINE, STEPS),
+        (Torque(amplitude=6e-4, frequency=0.05), ()),
+    ],
+)
+@pytest.mark.parametrize("modes", [0, 1])
+def test_disturbances_against_adaptive_integration(modes, torque, steps):
+    system = RIVALS.system(modes) if modes else RIGID
+
+    def force(t):
+        step = [value for when, value in steps if when <= t]
+        return (torque(t) if torque else 0.0) + (step[-1] if step else 0.0)
+
+    # A right-hand side that jumps at its break is integrated up to it from the left.
+    breaks = [when for when, _ in steps if when > 0]
+    start = at_rest(system)
+    run = propagate(system, start=start, duration=30.0, delay=0.3, disturbance=torque, steps=steps)
+    switches, x = adaptive(
+        system, start=start, duration=30.0, arrive=lambda t: t + 0.3, breaks=breaks,
+        force=force,
+    )  # fmt: skip
+    assert len(run.switch_times) == len(switches)
+    # The stages at a break itself see the new value: one rejected step of 1e-12 relative at most.
+    assert run.switch_times == pytest.approx(switches, abs=1e-9)
+    assert final(run) == pytest.approx(x, abs=1e-11)
+
+
+def test_pending_commands_and_the_acting_level_come_first():
+    pending = [(0.05, 0.004), (0.21, -0.006), (0.3, 0.001)]
+    start = State(0.001, 0.002)
+    run = propagate(RIGID, start=start, duration=10.0, delay=0.35, pending=pending, acting=-0.002)
+    assert run.times[:5].tolist() == [0.0, 0.05, 0.21, 0.3, 0.35]
+    assert run.inputs[:5].tolist() == [-0.002, 0.004, -0.006, 0.001, -0.007]
+    switches, x = adaptive(
+        RIGID, start=start, duration=10.0, arrive=lambda t: t + 0.35, pending=pending, u=-0.002
+    )
+    assert run.switch_times == pytest.approx(switches, abs=1e-9)  # rtol 1e-12 over the rate of s
+    assert final(run) == pytest.approx(x, abs=1e-11)
+
+
+# -- the second simulator ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("modes", [0, 1, 3])
+@pytest.mark.parametrize("delay", [0.2, Delay(mean=0.2, amplitude=0.15, frequency=2.0)])
+def test_the_same_law_flies_the_same_flight_on_the_reduced_plant(modes, delay):
+    coefficients = beam.galerkin(
+        bus_inertia=30.0, root_radius=3.0, length=7.5, linear_density=1.53,
+        bending_stiffness=35.0, damping_time=0.018542, n_modes=modes or 1,
+    )  # fmt: skip
+    torques = {"thruster_z": coefficients.J, "disturbance_z": coefficients.J}
+    model = galerkin_model(coefficients, torques=torques, tips={}) if modes else double_integrator()
+    sensors = ("attitude_z", "rate_z") if modes else (ANGLE, RATE)
+    law = MultilevelRelay(
+        c=0.31, thresholds=THRESHOLDS, levels=LEVELS, lowest=LEVELS[0], attraction=0.0,
+        attraction_level=0.0, compensated_delay=0.0, period=None, sensors=sensors,
+    )  # fmt: skip
+    plant = ReducedPhysics(model, start=galerkin_start(modes), timestep=0.02)
+    engine = Thrusters([Thruster(name="thruster_z", levels=LEVELS, delay=delay)])
+    initial = Initial(attitude=(0, 0, 0.03), rate=(0, 0, -0.004))
+    torque = Torque(constant=2e-4)
+    task = ControlTask(law, engine, initial=initial, disturbance=Disturbance({"z": torque}))
+    track = simulate(Environment(plant, task, duration=60.0, substeps=5), meta={})
+    system = system_of(
+        model, channel="thruster_z", switching=dict(zip(sensors, (0.31, 1.0), strict=True)),
+        thresholds=THRESHOLDS, levels=LEVELS,
+    )  # fmt: skip
+    q, w = (model.projection @ x for x in galerkin_start(modes)(initial))
+    start = State(float(q[0]), float(w[0]), (0j,) * modes)
+    if modes:
+        _, _, shapes = modal_form(model, "thruster_z")
+        both = np.c_[shapes, shapes.conj()]
+        start = start._replace(modes=tuple(np.linalg.solve(both, np.r_[q[1:], w[1:]])[:modes]))
+    run = propagate(system, start=start, duration=60.0, delay=delay, disturbance=torque)
+    command = track["thruster_z_command"]
+    changed = np.flatnonzero(np.diff(command)) + 1
+    times = track.time[changed]
+    assert len(times) == len(run.switch_times) - 1 > 50
+    assert command[changed].tolist() == pytest.approx(run.commands[1:], rel=1e-14)  # p x unit/unit
+    # The flight locates a switching to 1e-11 s; with modes a deviation decays slowly, so a few add.
+    assert times == pytest.approx(run.switch_times[1:], abs=1e-9)
+    angle, rate, _ = run.at(track.time[::50])
+    # 1e-9 s at rates of .01 rad/s and accelerations of .2 rad/s^2.
+    assert track[ANGLE][::50] == pytest.approx(angle, abs=1e-10)
+    assert track[RATE][::50] == pytest.approx(rate, abs=1e-9)
