@@ -22,6 +22,7 @@ S = (p + v1 c/2) (E - 1)/(c (2 - E)), and in the end |s| <= S, |beta| <= S/c,
 """
 
 import math
+from functools import partial
 
 from controllers.efremov_claims import PAPER, Claims, Theorem
 from controllers.efremov_relay import (
@@ -45,6 +46,7 @@ __all__ = [
     "design_local",
     "design_nonlocal",
     "limit_cycle",
+    "settling_time",
 ]
 
 CHANNEL = "thruster_z"
@@ -103,7 +105,7 @@ def design_local(
         parameters=(*parameters, pending, *_hardware(law, thrusters, max_delay)),
         max_delay=max_delay,
         accuracy=accuracy,
-        settling=0.0,
+        settling=lambda beta, v: 0.0,
         final_angle=3 * accuracy / 4,
         final_rate=5 * c * accuracy / 4,
         disturbance=c**2 * accuracy / 4,
@@ -186,9 +188,7 @@ def design_nonlocal(
         parameters=(*parameters, *_hardware(law, thrusters, max_delay)),
         max_delay=max_delay,
         accuracy=accuracy,
-        # The theorem names no time.  Attraction leaves nothing to settle; from far away no one of
-        # 4000 random runs took longer than 1.22 (ln(R/eps) + 1)/c.
-        settling=max_delay if law.attraction else 1.25 * (math.log(radius / accuracy) + 1) / c,
+        settling=partial(settling_time, c=c, accuracy=accuracy),
         final_angle=S / c,
         final_rate=2 * S,
         disturbance=v1 * c / 2,
@@ -196,6 +196,22 @@ def design_nonlocal(
     )
     claims = Claims(theorem=theorem, law=law, model=model, thrusters=thrusters)
     return law, (*claims.all(), claims.printed_rate())
+
+
+def settling_time(beta: float, v: float, *, c: float, accuracy: float) -> float:
+    """Returns the time until |beta| < eps under the law of Theorem 2, s.
+
+    The theorem says that there is one and names none; no one of 4000 random runs from |beta|, |v| < R
+    took longer than 1.22 (ln(R/eps) + 1)/c.
+
+    Args:
+        beta: Quasi-rigid angle at the start of feedback, rad.
+        v: Its rate, rad/s.
+        c: Slope of the switching line, 1/s.
+        accuracy: eps, rad.
+    """
+    start = max(abs(beta), abs(v), accuracy)
+    return 1.25 * (math.log(start / accuracy) + 1) / c
 
 
 def _gain_window(x: float, readings: dict[str, float]) -> tuple[Assumption, ...]:

@@ -31,7 +31,7 @@ class Theorem:
         parameters: Hypotheses that the design decides.
         max_delay: h0, s.
         accuracy: eps, rad.
-        settling: Time after the start of feedback from which |beta| < eps, s.
+        settling: Takes (beta, v) at the start of feedback to the time, s, until |beta| < eps.
         final_angle: Bound of |beta| in the end, rad.
         final_rate: Bound of |v| in the end, rad/s.
         disturbance: |f| must stay below this, rad/s^2.
@@ -42,7 +42,7 @@ class Theorem:
     parameters: tuple[Assumption, ...]
     max_delay: float
     accuracy: float
-    settling: float
+    settling: Callable[[float, float], float]
     final_angle: float
     final_rate: float
     disturbance: float
@@ -189,9 +189,7 @@ class Claims:
 
         def measured(trajectory: Trajectory) -> Measurement:
             m, start = measure(trajectory), self._feedback_start(trajectory)
-            beta, v = (
-                float(np.interp(start, trajectory.time, trajectory[x])) for x in (ANGLE, RATE)
-            )
+            beta, v = self._state_at(trajectory, start)
             disturbance = Assumption(
                 text="|f/J| below the bound of the theorem",
                 value=self._disturbance(trajectory),
@@ -210,13 +208,18 @@ class Claims:
         return measured
 
     def _after_settling(self, trajectory: Trajectory) -> Measurement:
-        start = self._feedback_start(trajectory) + self.theorem.settling
+        start = self._feedback_start(trajectory)
+        start += self.theorem.settling(*self._state_at(trajectory, start))
         late = trajectory.time >= start
         if not late.any():
             return Measurement(math.nan)
         worst = peak(trajectory.time[late], trajectory[ANGLE][late], trajectory[RATE][late])
-        predicted = abs(self._predicted_miss(trajectory)) if self.law.attraction else None
-        return Measurement(*worst, predicted=predicted)
+        return Measurement(*worst)
+
+    def _state_at(self, trajectory: Trajectory, t: float) -> tuple[float, float]:
+        """(beta, v) at an instant, between rows by interpolation."""
+        beta, v = (float(np.interp(t, trajectory.time, trajectory[x])) for x in (ANGLE, RATE))
+        return beta, v
 
     def _final(self, signal: str, rate: str | None) -> Measure:
         """Largest |signal| over the last minute; between the rows too where its rate is known."""

@@ -15,12 +15,13 @@ sensor noise.  (Own extension of Efremov et al. 2006.)
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import scipy.linalg
 
-from controllers.efremov import design_nonlocal
+from controllers.efremov import design_nonlocal, settling_time
 from controllers.efremov_claims import PAPER, Claims, Theorem
 from controllers.efremov_relay import RATE, MultilevelRelay
 from spacecraft_sim.checks import positive
@@ -292,7 +293,7 @@ def _claims(
         parameters=parameters,
         max_delay=max_delay,
         accuracy=accuracy,
-        settling=1.25 * (math.log(radius / accuracy) + 1) / c,
+        settling=partial(settling_time, c=c, accuracy=accuracy),
         final_angle=(S + errors.d1) / c + errors.angle,
         final_rate=2 * S + errors.d1 + errors.rate,
         disturbance=disturbance,

@@ -9,6 +9,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from spacecraft_sim.curve import Curve
+from spacecraft_sim.disturbance import Torque
+from spacecraft_sim.relay_system import RelaySystem, Row, State, propagate
 
 ULP = 2.0**-52
 LOCATED = 1e-13  # Newton's last step is taken from 1e-7 (1e-3 + tau) away, trusted to 1e-6
@@ -223,3 +225,67 @@ def test_a_search_begins_at_its_own_start():
     assert curve.first_exit(0.5, 10.0, 0.0, INF) == pytest.approx(math.pi, abs=8 * ULP)
     assert curve.first_exit(4.0, 10.0, -INF, 0.0) == pytest.approx(2 * math.pi, abs=16 * ULP)
     assert curve.first_exit(0.5, 3.0, 0.0, INF) is None
+
+
+# -- the curves of a relay system ----------------------------------------------------------------
+
+
+def shaken(modes):
+    """A relay with modes at frequencies 1.5 k^1.2, driven and felt the less the faster they are."""
+    k = np.arange(1, modes + 1)
+    poles = (-0.02 + 1.5j) * k**1.2
+    return RelaySystem(
+        switching=Row(angle=0.31, rate=1.0, modes=tuple((0.1 / k + 0j).tolist())),
+        levels=(0.007,),
+        eigenvalues=tuple(poles.tolist()),
+        drive=tuple((0.5 / k + 0j).tolist()),
+    )
+
+
+@pytest.mark.parametrize("modes", [0, 1, 3, 10])
+def test_peaks_against_dense_sampling(modes):
+    system = shaken(modes)
+    torque = Torque(constant=2e-4, amplitude=5e-4, frequency=1.3, phase=0.4)
+    run = propagate(
+        system, start=State(0.001, 0.0, (0j,) * modes), duration=30.0, delay=0.3, disturbance=torque
+    )
+    t = np.linspace(0.0, 30.0, 300_001)
+    angle, rate, z = run.at(t)
+    for row in (Row(angle=1.0), Row(rate=1.0), system.switching):
+        modal = 2 * (z @ np.array(row.modes)).real if row.modes else 0.0
+        x = np.abs(row.angle * angle + row.rate * rate + modal)
+        for after in (0.0, 12.34):
+            value, when = run.peak(row, after=after)
+            dense = np.max(x[t >= after])
+            # Half a sample, 5e-5 s, of a rate below .1 at a corner, where samples fall short.
+            assert dense * (1 - 1e-13) <= value <= dense + 5e-6
+            assert when >= after
+            at = [float(y[0]) for y in run.at([when])[:2]]
+            own = 2 * (run.at([when])[2][0] @ np.array(row.modes)).real if row.modes else 0.0
+            assert abs(row.angle * at[0] + row.rate * at[1] + own) == pytest.approx(
+                value, rel=1e-11
+            )
+
+
+def test_a_start_on_the_switching_line_that_bends_away_switches_at_once():
+    # beta = -1, v = 1, c = 1, u = -1: s = -t^2/2 exactly.  A command of +2 must leave at t = 0.
+    system = RelaySystem(switching=Row(angle=1.0, rate=1.0), levels=(2.0,))
+    run = propagate(system, start=State(-1.0, 1.0), duration=0.45, delay=0.5, acting=-1.0)
+    assert run.commands[-1] == 2.0
+    assert run.switch_times[-1] <= 2e-8  # s falls by an ulp in this time
+
+
+@pytest.mark.parametrize("ulps", range(-3, 4))
+def test_a_grazed_threshold_never_leaves_the_relay_in_the_wrong_cell(ulps):
+    # s rises to its top (v - 1)^2/2 + beta + v and falls on for ever, over every bound on its way.
+    rng = np.random.default_rng(7)
+    for _ in range(300):
+        v = 1 + rng.uniform(0.1, 3)
+        beta = -v - rng.uniform(0, 0.49) * (v - 1) ** 2
+        top = beta + v + (v - 1) ** 2 / 2
+        threshold = top + ulps * math.ulp(top)
+        system = RelaySystem(
+            switching=Row(angle=1.0, rate=1.0), thresholds=(threshold,), levels=(2.0, 6.0)
+        )
+        run = propagate(system, start=State(beta, v), duration=20.0, delay=30.0, acting=-1.0)
+        assert run.commands[-1] == 6.0  # far below -threshold in the end

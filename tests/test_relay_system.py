@@ -1,9 +1,7 @@
-"""Relay systems: the figures of the paper, high precision, other integrators, a second simulator."""
+"""Relay systems against printed figures, 40 digits, other integrators and a second simulator."""
 
-import importlib.util
 import math
 from itertools import pairwise
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -11,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from controllers.efremov import MultilevelRelay, attracting, limit_cycle
-from spacecraft_sim import beam
+from spacecraft_sim import beam, curve
 from spacecraft_sim.delay import Delay
 from spacecraft_sim.disturbance import Disturbance, Torque
 from spacecraft_sim.modal_form import modal_form, row_of, system_of
@@ -37,15 +35,33 @@ LEVELS = tuple(0.007 * 3**k for k in range(5))
 RIGID = RelaySystem(switching=Row(angle=0.31, rate=1.0), levels=(0.007,))
 
 
-def script(name):
-    path = Path(__file__).parents[1] / "scripts" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(f"script_{name}", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+C, LEVEL, DELAY, DURATION = 0.31, 0.007, 0.3664, 100.0
 
 
-RIVALS = script("relay_rivals")
+def flexible(modes):
+    """A bus with the authors' booms under feedback of its own attitude and rate."""
+    coefficients = beam.galerkin(
+        bus_inertia=30.0, root_radius=3.0, length=7.5, linear_density=1.53,
+        bending_stiffness=35.0, n_modes=modes,
+        damping_time=0.018542 / max(1.0, modes / 3) ** 2,  # keeps every mode underdamped
+    )  # fmt: skip
+    model = galerkin_model(coefficients, torques={"u": 1.0}, tips={})
+    return system_of(
+        model, channel="u", switching={"attitude_z": C, "rate_z": 1.0}, levels=(LEVEL,)
+    )
+
+
+def matrices(system):
+    """Real A, b, c of x' = A x + b u, s = c x, with x = (beta, v, Re z, Im z, ...)."""
+    n = 2 + 2 * len(system.eigenvalues)
+    A, b, c = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    A[0, 1], b[1], c[:2] = 1.0, 1.0, (system.switching.angle, system.switching.rate)
+    rows = zip(system.eigenvalues, system.drive, system.switching.modes, strict=True)
+    for k, (x, g, d) in enumerate(rows):
+        i = slice(2 + 2 * k, 4 + 2 * k)
+        A[i, i] = [[x.real, -x.imag], [x.imag, x.real]]
+        b[i], c[i] = (g.real, g.imag), (2 * d.real, -2 * d.imag)
+    return A, b, c
 
 
 def at_rest(system, angle=0.001):
@@ -62,7 +78,7 @@ def multilevel(system):
 
 def adaptive(system, *, start, duration, arrive, force=lambda t: 0.0, breaks=(), pending=(), u=0.0):
     """DOP853 from effect to effect, stopped at every bound of s: switchings and final state."""
-    A, b, c = RIVALS.matrices(system)
+    A, b, c = matrices(system)
     z = [part for mode in start.modes for part in (mode.real, mode.imag)]
     x, t, queue, switches = np.array([start.angle, start.rate, *z]), 0.0, list(pending), []
     bounds = [*(-v for v in system.thresholds[::-1]), 0.0, *system.thresholds]
@@ -73,7 +89,7 @@ def adaptive(system, *, start, duration, arrive, force=lambda t: 0.0, breaks=(),
         if fresh:
             switches.append(t)
             queue.append((arrive(t), levels[cell]))
-        end = min(duration, *(q[0] for q in queue[:1]), *(x for x in breaks if x > t))
+        end = min([duration, *(q[0] for q in queue[:1]), *(x for x in breaks if x > t)])
         events = []
         for side, k in ((1.0, cell - 1), (-1.0, cell)):
             if 0 <= k < len(bounds):
@@ -164,11 +180,11 @@ def test_limit_cycle_figures():
 def high_precision(case, duration):
     """The rivals' case with 40 digits: a scan of s in small steps, then Newton by secants."""
     mp = mpmath.mp
-    c, p, h = mp.mpf(RIVALS.C), mp.mpf(RIVALS.LEVEL), mp.mpf(RIVALS.DELAY)
+    c, p, h = mp.mpf(C), mp.mpf(LEVEL), mp.mpf(DELAY)
     lam, b, d = (mp.mpc(x) for x in (case.eigenvalues[0], case.drive[0], case.switching.modes[0]))
     ca, cv = mp.mpf(case.switching.angle), mp.mpf(case.switching.rate)
     assert float(c) == pytest.approx(float(ca), rel=1e-14)  # the row is the one meant, to rounding
-    t, beta, v, z, u = mp.mpf(0), mp.mpf(RIVALS.ANGLE), mp.mpf(0), mp.mpc(0), mp.mpf(0)
+    t, beta, v, z, u = mp.mpf(0), mp.mpf(0.001), mp.mpf(0), mp.mpc(0), mp.mpf(0)
     queue, switches, sign = [(h, -p)], [mp.mpf(0)], 1
     while t < duration:
         end = min(queue[0][0], mp.mpf(duration)) if queue else mp.mpf(duration)
@@ -183,12 +199,12 @@ def high_precision(case, duration):
             x = moved(tau)
             return ca * x[0] + cv * x[1] + 2 * (d * x[2]).real
 
-        n = max(1, math.ceil((end - t) / mp.mpf("0.02")))
-        grid = [(end - t) * k / n for k in range(n + 1)]
-        values = [s(tau) for tau in grid]
-        for (x0, s0), (x1, s1) in pairwise(zip(grid, values, strict=True)):
-            if s0 * sign > 0 >= s1 * sign:
-                root = mpmath.findroot(s, (x0, x1), solver="anderson", tol=mp.mpf(10) ** -60)
+        # Sixteen digits are enough to bracket the zeros; s has no wave shorter than 2 s.
+        grid = np.linspace(0.0, float(end - t), 65)
+        signs = [sign, *(sign if x * sign > 0 else -sign for x in map(s, grid[1:].tolist()))]
+        for (x0, s0), (x1, s1) in pairwise(zip(grid.tolist(), signs, strict=True)):
+            if s0 != s1:
+                root = mpmath.findroot(s, (x0, x1), tol=mp.mpf(10) ** -70)
                 sign = -sign
                 switches.append(t + root)
                 queue.append((t + root + h, -sign * p))
@@ -201,10 +217,10 @@ def high_precision(case, duration):
 
 
 def test_switching_times_against_forty_digits():
-    case = RIVALS.system()
-    run = RIVALS.exact(case)
+    case = flexible(1)
+    run = propagate(case, start=at_rest(case), duration=DURATION, delay=DELAY)
     with mpmath.workdps(40):
-        exact = high_precision(case, RIVALS.DURATION)
+        exact = high_precision(case, DURATION)
         assert len(run.switch_times) == len(exact) == 130  # the first command and 129 switchings
         error = max(abs(a - b) for a, b in zip(run.switch_times.tolist(), exact, strict=True))
     # A clock of 100 s has 1.4e-14 s; the rounding of 129 segments adds up to a few dozen of them.
@@ -239,7 +255,7 @@ STEPS = ((0.0, 3e-4), (7.3, -6e-4), (21.0, 1e-4))
 @pytest.mark.parametrize("delay", DELAYS)
 @pytest.mark.parametrize("modes", [0, 1, 3])
 def test_against_adaptive_integration(modes, delay):
-    system = multilevel(RIVALS.system(modes) if modes else RIGID)
+    system = multilevel(flexible(modes) if modes else RIGID)
     start = at_rest(system, 0.03)._replace(rate=0.01)
     given, arrive = DELAYS[delay]
     run = propagate(system, start=start, duration=20.0, delay=given)
@@ -247,7 +263,8 @@ def test_against_adaptive_integration(modes, delay):
     assert len(run.switch_times) == len(switches) > 20
     # rtol 1e-12 of a state of .03 over rates of s of 1e-3 and 20 s: some 1e-10 s (rivals' script).
     assert run.switch_times == pytest.approx(switches, abs=1e-9)
-    assert final(run) == pytest.approx(x, abs=1e-11)
+    # 1e-9 s of a motion of frequencies around 1 rad/s.
+    assert final(run) == pytest.approx(x, abs=1e-9 * max(np.abs(x)))
 
 
 @pytest.mark.parametrize(
@@ -262,7 +279,7 @@ def test_against_adaptive_integration(modes, delay):
 )
 @pytest.mark.parametrize("modes", [0, 1])
 def test_disturbances_against_adaptive_integration(modes, torque, steps):
-    system = RIVALS.system(modes) if modes else RIGID
+    system = flexible(modes) if modes else RIGID
 
     def force(t):
         step = [value for when, value in steps if when <= t]
@@ -279,7 +296,8 @@ def test_disturbances_against_adaptive_integration(modes, torque, steps):
     assert len(run.switch_times) == len(switches)
     # The stages at a break itself see the new value: one rejected step of 1e-12 relative at most.
     assert run.switch_times == pytest.approx(switches, abs=1e-9)
-    assert final(run) == pytest.approx(x, abs=1e-11)
+    # 1e-9 s of a motion of frequencies around 1 rad/s.
+    assert final(run) == pytest.approx(x, abs=1e-9 * max(np.abs(x)))
 
 
 def test_pending_commands_and_the_acting_level_come_first():
@@ -292,7 +310,8 @@ def test_pending_commands_and_the_acting_level_come_first():
         RIGID, start=start, duration=10.0, arrive=lambda t: t + 0.35, pending=pending, u=-0.002
     )
     assert run.switch_times == pytest.approx(switches, abs=1e-9)  # rtol 1e-12 over the rate of s
-    assert final(run) == pytest.approx(x, abs=1e-11)
+    # 1e-9 s of a motion of frequencies around 1 rad/s.
+    assert final(run) == pytest.approx(x, abs=1e-9 * max(np.abs(x)))
 
 
 # -- the second simulator ----------------------------------------------------------------------
@@ -317,7 +336,7 @@ def test_the_same_law_flies_the_same_flight_on_the_reduced_plant(modes, delay):
     initial = Initial(attitude=(0, 0, 0.03), rate=(0, 0, -0.004))
     torque = Torque(constant=2e-4)
     task = ControlTask(law, engine, initial=initial, disturbance=Disturbance({"z": torque}))
-    track = simulate(Environment(plant, task, duration=60.0, substeps=5), meta={})
+    track = simulate(Environment(plant, task, duration=20.0, substeps=5), meta={})
     system = system_of(
         model, channel="thruster_z", switching=dict(zip(sensors, (0.31, 1.0), strict=True)),
         thresholds=THRESHOLDS, levels=LEVELS,
@@ -328,15 +347,103 @@ def test_the_same_law_flies_the_same_flight_on_the_reduced_plant(modes, delay):
         _, _, shapes = modal_form(model, "thruster_z")
         both = np.c_[shapes, shapes.conj()]
         start = start._replace(modes=tuple(np.linalg.solve(both, np.r_[q[1:], w[1:]])[:modes]))
-    run = propagate(system, start=start, duration=60.0, delay=delay, disturbance=torque)
+    run = propagate(system, start=start, duration=20.0, delay=delay, disturbance=torque)
     command = track["thruster_z_command"]
     changed = np.flatnonzero(np.diff(command)) + 1
     times = track.time[changed]
-    assert len(times) == len(run.switch_times) - 1 > 50
+    assert len(times) == len(run.switch_times) - 1 > 40
     assert command[changed].tolist() == pytest.approx(run.commands[1:], rel=1e-14)  # p x unit/unit
-    # The flight locates a switching to 1e-11 s; with modes a deviation decays slowly, so a few add.
-    assert times == pytest.approx(run.switch_times[1:], abs=1e-9)
+    # The flight finds a switching up to 1e-11 s late, which delays the next by (2 - ch)/(1 - ch)
+    # = 2.1 times as much and never decays: the phase of a limit cycle is free.
+    assert times == pytest.approx(run.switch_times[1:], abs=2.1e-11 * len(times))
     angle, rate, _ = run.at(track.time[::50])
     # 1e-9 s at rates of .01 rad/s and accelerations of .2 rad/s^2.
     assert track[ANGLE][::50] == pytest.approx(angle, abs=1e-10)
     assert track[RATE][::50] == pytest.approx(rate, abs=1e-9)
+
+
+def test_a_square_wave_is_refused_or_flown_as_one():
+    torque = Torque(amplitude=6e-4, frequency=1.0, waveform="square")
+    steps = [(k * math.pi, 6e-4 * (-1) ** k) for k in range(10)]
+    exact = propagate(RIGID, start=State(0.001, 0.0), duration=30.0, delay=0.2, steps=steps)
+    try:
+        run = propagate(
+            RIGID, start=State(0.001, 0.0), duration=30.0, delay=0.2, disturbance=torque
+        )
+    except ValueError as error:
+        assert "square" in str(error)  # noqa: PT017
+        return
+    # The same run but for the rounding of the edges, some 1e-15 s each.
+    assert run.switch_times == pytest.approx(exact.switch_times, abs=1e-11)
+
+
+# -- cost, input ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("modes", [0, 10])
+def test_work_grows_in_proportion_to_the_switchings(modes, monkeypatch):
+    system, counts = (flexible(modes) if modes else RIGID), []
+    evaluate = curve.Curve.__call__
+
+    def counted(self, tau):
+        counts[-1] += 1
+        return evaluate(self, tau)
+
+    monkeypatch.setattr(curve.Curve, "__call__", counted)
+    share, segments = [], []
+    for duration in (50.0, 200.0, 800.0):
+        counts.append(0)
+        run = propagate(system, start=at_rest(system), duration=duration, delay=0.3664)
+        share.append(counts[-1] / len(run.switch_times))
+        segments.append((len(run.times) - 1) / len(run.switch_times))
+    # The transient of 20 s differs from the limit cycle by a few evaluations a switching.
+    assert max(share) < 1.3 * min(share)
+    assert max(segments) <= 1.1  # one a command, and the last
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"delay": -0.2}, r"delay = -0\.2"),
+        ({"delay": 0.0}, r"delay = 0\.0"),
+        ({"delay": math.nan}, "delay = nan"),
+        ({"delay": lambda t: 0.1 - t}, r"negative: h\(0\.1\d* s\) = -\d"),
+        ({"delay": lambda t: 0.1 + 2 * max(t - 1, 0)}, "grows too fast"),
+        ({"duration": 0.0}, r"> 0: duration = 0\.0"),
+        ({"duration": -1.0}, r"> 0: duration = -1\.0"),
+        ({"pending": [(0.1, 0.0), (0.05, 0.0)]}, r"pending.*ascending.*\[0\.1, 0\.05\]"),
+        ({"pending": [(-0.1, 0.0)]}, r"pending.*>= 0.*\[-0\.1\]"),
+        ({"steps": [(3.0, 0.0), (2.0, 0.0)]}, r"steps.*ascending.*\[3\.0, 2\.0\]"),
+        ({"start": State(0.0, 0.0, (0j,))}, "1 modal coordinates, the system 0"),
+        ({"disturbance": Torque(amplitude=1.0)}, "frequency"),
+    ],
+)
+def test_bad_input_is_refused_with_its_value(changes, message):
+    given = {"start": State(0.001, 0.0), "duration": 30.0, "delay": 0.2} | changes
+    with pytest.raises(ValueError, match=message):
+        propagate(RIGID, **given)
+
+
+def test_a_pending_command_behind_the_first_feedback_command_is_out_of_order():
+    # A delay line keeps the order: what was under way at t = 0 cannot act after the first feedback.
+    with pytest.raises(ValueError, match=r"pending.*0\.5"):
+        propagate(RIGID, start=State(0.001, 0.0), duration=2.0, delay=0.2, pending=[(0.5, 0.007)])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"levels": ()}, "0 thresholds need 1 levels, got 0"),
+        ({"thresholds": (1.0,)}, "1 thresholds need 2 levels, got 1"),
+        ({"thresholds": (2.0, 1.0), "levels": (1.0,) * 3}, r"ascending, got \(2\.0, 1\.0\)"),
+        ({"thresholds": (0.0,), "levels": (1.0,) * 2}, r"positive.*got \(0\.0,\)"),
+        ({"thresholds": (1.0, 1.0), "levels": (1.0,) * 3}, "ascending"),
+        ({"eigenvalues": (-1 + 3j,), "drive": ()}, "drive"),
+        ({"switching": Row(rate=1.0, modes=(1j, 2j)), "eigenvalues": (-1 + 3j,), "drive": (1j,)}, "2"),
+        # The curve's bound x'' <= ripple, on which no exit is missed, needs Re lambda <= 0.
+        ({"switching": Row(rate=1.0, modes=(1j,)), "eigenvalues": (1 + 3j,), "drive": (1j,)}, "1"),
+    ],
+)  # fmt: skip
+def test_a_system_is_refused_at_construction(changes, message):
+    with pytest.raises(ValueError, match=message):
+        RelaySystem(**{"switching": Row(angle=0.31, rate=1.0), "levels": (0.007,)} | changes)
