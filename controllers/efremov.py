@@ -201,8 +201,8 @@ def design_nonlocal(
 def settling_time(beta: float, v: float, *, c: float, accuracy: float) -> float:
     """Returns the time until |beta| < eps under the law of Theorem 2, s.
 
-    The theorem says that there is one and names none; no one of 4000 random runs from |beta|, |v| < R
-    took longer than 1.22 (ln(R/eps) + 1)/c.
+    The theorem says that there is one and names none; no one of 4000 random runs from |beta|, |v|
+    below R took longer than 1.22 (ln(R/eps) + 1)/c.
 
     Args:
         beta: Quasi-rigid angle at the start of feedback, rad.

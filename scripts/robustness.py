@@ -1,8 +1,8 @@
-"""Flies the laws of Efremov et al. (2006) on MuJoCo plants that are not the ones they were made for.
+"""Flies the laws of Efremov et al. (2006) on MuJoCo plants other than those they were made for.
 
-Stiffness, mass, damping and delay are off by up to 20 %, the disturbance is a square wave at the bound
-of the theorem, in step with the limit cycle, which is where it does most harm. A claim whose
-assumption fails is reported as not guaranteed, whatever was measured.
+Stiffness, mass, damping and delay are off by up to 20 %; the disturbance is a square wave at the
+bound of the theorem, in step with the limit cycle or a few times slower. A claim whose assumption
+fails is reported as not guaranteed, whatever was measured.
 """
 
 import argparse

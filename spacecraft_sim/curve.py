@@ -7,7 +7,6 @@ misses none; near it each step doubles the digits.
 
 import cmath
 import math
-from collections.abc import Callable
 
 Wave = tuple[complex, complex]  # (exponent mu, amplitude a): the term 2 Re a e^(mu tau)
 
@@ -51,39 +50,40 @@ class Curve:
             high: Upper bound of the cell; inf for none.
         """
         down, up = 2 * self.a2 - self.ripple, 2 * self.a2 + self.ripple
-        sqrt, inf = math.sqrt, math.inf
-        resolution = 2e-16 * max(abs(low) if low > -inf else 0.0, abs(high) if high < inf else 0.0)
+        exact = self.ripple == 0
         while True:
             x, v = self(tau)
-            step, gap = inf, inf
-            if low > -inf:
+            step = gap = math.inf
+            if low > -math.inf:
                 gap = x - low
-                step = _reach(gap, v, down, sqrt)
-            if high < inf:
-                other = _reach(high - x, -v, -up, sqrt)
+                step = _reach(gap, v, down)
+            if high < math.inf:
+                other = _reach(high - x, -v, -up)
                 if other < step:  # from here on (gap, v) speak of the bound that comes first
                     step, gap, v = other, high - x, -v
             if tau + step > end:
                 return None
-            # Newton's step agrees with the bound once the bound is sharp: that is the exit.
-            if v < 0 and (gap <= resolution or step < 1e-7 * (1e-3 + tau)):
-                newton = gap / -v
-                if newton <= 4e-16 * (1 + tau) or gap <= resolution:
-                    return tau + max(newton, 0.0)
-                if abs(newton - step) <= 1e-6 * step:
-                    return min(tau + newton, end)
-            tau += max(step, 1e-15 * (1 + tau))
+            if exact or step <= 1e-16 * (1 + tau):
+                return tau + step
+            # Near the exit Newton's step and the bound enclose it.
+            if v < 0 and abs(gap / v + step) <= 1e-16 * (1 + tau):
+                return tau - gap / v
+            tau += step
 
 
-def _reach(gap: float, v: float, curvature: float, sqrt: Callable[[float], float]) -> float:
-    """Smallest d > 0 with gap + v d + curvature d^2/2 = 0; inf if there is none.
+def _reach(gap: float, v: float, curvature: float) -> float:
+    """Smallest d >= 0 from which gap + v d + curvature d^2/2 is below zero; inf if there is none.
 
-    Each case takes the form of the root that does not cancel: just after an exit the gap to the
-    bound that was crossed is zero to rounding, and what counts is when s comes back.
+    Just after an exit the gap to the bound that was crossed is zero to rounding, of either sign;
+    what counts then is when the curve comes back, so each case takes a form that does not cancel.
     """
     square = v * v - 2 * curvature * gap
-    if v > 0:
-        return (v + sqrt(square)) / -curvature if curvature < 0 else math.inf
+    if v > 0 or (gap <= 0 and v == 0):
+        if curvature >= 0:
+            return math.inf
+        return (v + math.sqrt(square)) / -curvature if square > 0 else 0.0
+    if gap <= 0:
+        return 0.0
     if square < 0 or v == square == 0:
         return math.inf
-    return max(2 * gap / (sqrt(square) - v), 0.0)
+    return 2 * gap / (math.sqrt(square) - v)

@@ -78,6 +78,16 @@ class RelaySystem:
             )
         if any(a >= b for a, b in pairwise((0.0, *self.thresholds))):
             raise ValueError(f"thresholds must be positive and ascending, got {self.thresholds}")
+        n = len(self.eigenvalues)
+        for name, parts in (
+            ("drive", self.drive),
+            ("modes of the switching row", self.switching.modes),
+        ):
+            if len(parts) != n and (parts or name == "drive"):
+                raise ValueError(f"{n} eigenvalues need {n} {name}, got {len(parts)}")
+        growing = [x for x in self.eigenvalues if x.real > 0]
+        if growing:
+            raise ValueError(f"eigenvalues must not grow, Re <= 0; got {growing}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -193,6 +203,8 @@ def propagate(
         raise ValueError(
             f"start has {len(start.modes)} modal coordinates, the system {len(system.eigenvalues)}"
         )
+    if disturbance is not None and disturbance.waveform == "square":
+        raise ValueError("a square disturbance has corners: give it as `steps`, (time, value)")
     arrive = arrival(delay)
     queue, changes = deque(pending), deque(steps)
     for name, times in (("pending", [t for t, _ in queue]), ("steps", [t for t, _ in changes])):
@@ -206,9 +218,15 @@ def propagate(
 
     def issue(at: float, new: _Cell) -> float:
         """Commands the level of a cell; returns when the next command takes effect."""
+        effect = arrive(at)
+        if queue and queue[-1][0] > effect:
+            raise ValueError(
+                f"pending commands act until {queue[-1][0]} s, after the feedback command of "
+                f"t = {at} s, which acts at {effect} s: a delay line keeps the order"
+            )
         switches.append(at)
         commands.append(new.level)
-        queue.append((arrive(at), new.level))
+        queue.append((effect, new.level))
         return queue[0][0]
 
     t, x = 0.0, steady.subtract(0.0, start)
@@ -228,7 +246,7 @@ def propagate(
         tau = 0.0
         while (found := curve.first_exit(tau, end - t, cell.low, cell.high)) is not None:
             tau = found
-            cell = relay.next(cell, curve(tau)[1])
+            cell = relay.next(cell, curve(tau)[0])
             end = min(end, issue(t + tau, cell))
         x = moved(system, x, acceleration, end - t)
         t = end
@@ -268,9 +286,9 @@ class _Staircase:
         inner = self._bounds[1:-1]
         return self._at(bisect_right(inner, s) if s >= 0 else bisect_left(inner, s))
 
-    def next(self, cell: _Cell, rate: float) -> _Cell:
-        """The neighbour into which s moves."""
-        return self._at(cell.index + (1 if rate > 0 else -1))
+    def next(self, cell: _Cell, s: float) -> _Cell:
+        """The neighbour behind the bound at which s is."""
+        return self._at(cell.index + (1 if cell.high - s < s - cell.low else -1))
 
     def _at(self, i: int) -> _Cell:
         return _Cell(i, self._bounds[i], self._bounds[i + 1], self._levels[i])

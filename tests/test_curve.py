@@ -52,7 +52,7 @@ curves = st.builds(Curve, coefficient, coefficient, coefficient, st.lists(wave, 
 room = st.one_of(st.floats(1e-9, 2), st.just(INF))
 
 
-@settings(max_examples=20000)
+@settings(max_examples=400)
 @given(curves, room, room, st.floats(0.05, 4))
 @example(Curve(0.0, 0.0, 0.0, []), 1.0, 1.0, 1.0)
 @example(Curve(0.0, -1.0, 1.0, []), 0.25, INF, 4.0)  # touches the bound at 1/2

@@ -1,4 +1,4 @@
-"""Relay systems against printed figures, 40 digits, other integrators and a second simulator."""
+"""Relay systems against printed figures, 40 digits and other integrators."""
 
 import math
 from itertools import pairwise
@@ -8,28 +8,19 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from controllers.efremov import MultilevelRelay, attracting, limit_cycle
+from controllers.efremov import attracting, limit_cycle
 from spacecraft_sim import beam, curve
 from spacecraft_sim.delay import Delay
-from spacecraft_sim.disturbance import Disturbance, Torque
+from spacecraft_sim.disturbance import Torque
 from spacecraft_sim.modal_form import modal_form, row_of, system_of
-from spacecraft_sim.reduced import (
-    ReducedPhysics,
-    double_integrator,
-    galerkin_model,
-    galerkin_start,
-)
+from spacecraft_sim.reduced import galerkin_model, galerkin_start
 from spacecraft_sim.relay_system import RelaySystem, Row, State, propagate
 from spacecraft_sim.scenario import Initial
-from spacecraft_sim.simulate import Environment, simulate
-from spacecraft_sim.spacecraft import Thruster
-from spacecraft_sim.task import ControlTask
-from spacecraft_sim.thrusters import Thrusters
 
 ANGLE, RATE = "quasi_rigid_angle_z", "quasi_rigid_rate_z"
 # Section 5 of Efremov et al. 2006: one mode, five levels, per unit of inertia.
-PRINTED = beam.Galerkin(J=1183.24, p=[22.335], a=[11.06], b=[0.72], c=[38.83])
-PRINTED = beam.Galerkin(**{k: np.asarray(getattr(PRINTED, k)) for k in ("J", "p", "a", "b", "c")})
+p, a, b, c = (np.array([x]) for x in (22.335, 11.06, 0.72, 38.83))
+PRINTED = beam.Galerkin(J=1183.24, p=p, a=a, b=b, c=c)
 THRESHOLDS = tuple(0.0045 * 3**i for i in range(4))
 LEVELS = tuple(0.007 * 3**k for k in range(5))
 RIGID = RelaySystem(switching=Row(angle=0.31, rate=1.0), levels=(0.007,))
@@ -314,54 +305,6 @@ def test_pending_commands_and_the_acting_level_come_first():
     assert final(run) == pytest.approx(x, abs=1e-9 * max(np.abs(x)))
 
 
-# -- the second simulator ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("modes", [0, 1, 3])
-@pytest.mark.parametrize("delay", [0.2, Delay(mean=0.2, amplitude=0.15, frequency=2.0)])
-def test_the_same_law_flies_the_same_flight_on_the_reduced_plant(modes, delay):
-    coefficients = beam.galerkin(
-        bus_inertia=30.0, root_radius=3.0, length=7.5, linear_density=1.53,
-        bending_stiffness=35.0, damping_time=0.018542, n_modes=modes or 1,
-    )  # fmt: skip
-    torques = {"thruster_z": coefficients.J, "disturbance_z": coefficients.J}
-    model = galerkin_model(coefficients, torques=torques, tips={}) if modes else double_integrator()
-    sensors = ("attitude_z", "rate_z") if modes else (ANGLE, RATE)
-    law = MultilevelRelay(
-        c=0.31, thresholds=THRESHOLDS, levels=LEVELS, lowest=LEVELS[0], attraction=0.0,
-        attraction_level=0.0, compensated_delay=0.0, period=None, sensors=sensors,
-    )  # fmt: skip
-    plant = ReducedPhysics(model, start=galerkin_start(modes), timestep=0.02)
-    engine = Thrusters([Thruster(name="thruster_z", levels=LEVELS, delay=delay)])
-    initial = Initial(attitude=(0, 0, 0.03), rate=(0, 0, -0.004))
-    torque = Torque(constant=2e-4)
-    task = ControlTask(law, engine, initial=initial, disturbance=Disturbance({"z": torque}))
-    track = simulate(Environment(plant, task, duration=20.0, substeps=5), meta={})
-    system = system_of(
-        model, channel="thruster_z", switching=dict(zip(sensors, (0.31, 1.0), strict=True)),
-        thresholds=THRESHOLDS, levels=LEVELS,
-    )  # fmt: skip
-    q, w = (model.projection @ x for x in galerkin_start(modes)(initial))
-    start = State(float(q[0]), float(w[0]), (0j,) * modes)
-    if modes:
-        _, _, shapes = modal_form(model, "thruster_z")
-        both = np.c_[shapes, shapes.conj()]
-        start = start._replace(modes=tuple(np.linalg.solve(both, np.r_[q[1:], w[1:]])[:modes]))
-    run = propagate(system, start=start, duration=20.0, delay=delay, disturbance=torque)
-    command = track["thruster_z_command"]
-    changed = np.flatnonzero(np.diff(command)) + 1
-    times = track.time[changed]
-    assert len(times) == len(run.switch_times) - 1 > 40
-    assert command[changed].tolist() == pytest.approx(run.commands[1:], rel=1e-14)  # p x unit/unit
-    # The flight finds a switching up to 1e-11 s late, which delays the next by (2 - ch)/(1 - ch)
-    # = 2.1 times as much and never decays: the phase of a limit cycle is free.
-    assert times == pytest.approx(run.switch_times[1:], abs=2.1e-11 * len(times))
-    angle, rate, _ = run.at(track.time[::50])
-    # 1e-9 s at rates of .01 rad/s and accelerations of .2 rad/s^2.
-    assert track[ANGLE][::50] == pytest.approx(angle, abs=1e-10)
-    assert track[RATE][::50] == pytest.approx(rate, abs=1e-9)
-
-
 def test_a_square_wave_is_refused_or_flown_as_one():
     torque = Torque(amplitude=6e-4, frequency=1.0, waveform="square")
     steps = [(k * math.pi, 6e-4 * (-1) ** k) for k in range(10)]
@@ -375,6 +318,20 @@ def test_a_square_wave_is_refused_or_flown_as_one():
         return
     # The same run but for the rounding of the edges, some 1e-15 s each.
     assert run.switch_times == pytest.approx(exact.switch_times, abs=1e-11)
+
+
+def test_feedback_begins_when_it_is_told_to():
+    run = propagate(RIGID, start=State(0.001, 0.0), duration=5.0, delay=0.2, feedback_from=1.7)
+    assert run.switch_times[0] == 1.7
+    assert run.inputs[run.times[:-1] < 1.9].tolist() == [0.0, 0.0]  # the first acts at 1.9
+    assert run.inputs[2] == -0.007
+    never = propagate(
+        RIGID, start=State(0.001, 0.002), duration=5.0, delay=0.2, feedback_from=math.inf,
+        acting=0.003,
+    )  # fmt: skip
+    assert never.switch_times.size == 0
+    # One parabola; a few roundings.
+    assert final(never) == pytest.approx([0.001 + 0.01 + 0.003 * 12.5, 0.017], rel=1e-14)
 
 
 # -- cost, input ----------------------------------------------------------------------
@@ -439,9 +396,9 @@ def test_a_pending_command_behind_the_first_feedback_command_is_out_of_order():
         ({"thresholds": (0.0,), "levels": (1.0,) * 2}, r"positive.*got \(0\.0,\)"),
         ({"thresholds": (1.0, 1.0), "levels": (1.0,) * 3}, "ascending"),
         ({"eigenvalues": (-1 + 3j,), "drive": ()}, "drive"),
-        ({"switching": Row(rate=1.0, modes=(1j, 2j)), "eigenvalues": (-1 + 3j,), "drive": (1j,)}, "2"),
+        ({"switching": Row(modes=(1j, 2j)), "eigenvalues": (-1 + 3j,), "drive": (1j,)}, "2"),
         # The curve's bound x'' <= ripple, on which no exit is missed, needs Re lambda <= 0.
-        ({"switching": Row(rate=1.0, modes=(1j,)), "eigenvalues": (1 + 3j,), "drive": (1j,)}, "1"),
+        ({"switching": Row(modes=(1j,)), "eigenvalues": (1 + 3j,), "drive": (1j,)}, "1"),
     ],
 )  # fmt: skip
 def test_a_system_is_refused_at_construction(changes, message):
