@@ -26,7 +26,7 @@ from controllers.efremov_claims import PAPER, Claims, Theorem
 from controllers.efremov_relay import RATE, MultilevelRelay
 from spacecraft_sim.checks import positive
 from spacecraft_sim.guarantee import Assumption, Guarantee
-from spacecraft_sim.modal_form import modal_form, real_form, row_of
+from spacecraft_sim.modal_form import driven_coordinate, modal_form, real_form, row_of
 from spacecraft_sim.reduced import ReducedModel
 from spacecraft_sim.relay_system import RelaySystem, Row, State, moved
 from spacecraft_sim.thrusters import Thrusters
@@ -34,6 +34,7 @@ from spacecraft_sim.thrusters import Thrusters
 Array = np.ndarray
 CHANNEL = "thruster_z"
 SENSORS = {"angle": ("attitude_z",), "angle and rate": ("attitude_z", "rate_z")}
+_UNKNOWN = 10.0  # disturbance of each single mode over that by the torque, for the gain alone
 _SUMMED = 200_000  # samples over which an impulse response is summed at most
 
 
@@ -160,8 +161,8 @@ def design_observed(
     disturbance: float,
     sensors: Literal["angle", "angle and rate"] = "angle and rate",
     delay_error: float = 0.0,
-    angle_noise: float = 1e-6,
-    rate_noise: float = 1e-6,
+    angle_noise: float = 1e-5,
+    rate_noise: float = 1e-5,
     level: float | None = None,
     threshold: float | None = None,
 ) -> tuple[ObservedRelay, tuple[Guarantee, ...]]:
@@ -199,7 +200,8 @@ def design_observed(
     )  # fmt: skip
     eigenvalues, drive, shapes = modal_form(model, CHANNEL)
     names = SENSORS[sensors]
-    rows = tuple(row_of(model, name, shapes) for name in names)
+    coordinate = driven_coordinate(model, CHANNEL)
+    rows = tuple(row_of(model, name, shapes, coordinate) for name in names)
     system = RelaySystem(
         switching=Row(angle=c, rate=1.0),
         levels=(relay.lowest,),
@@ -237,7 +239,8 @@ def _observer(
     # Elementwise bound of the response to an impulse anywhere in a sample interval.
     reach = np.max([np.abs(scipy.linalg.expm(A * t) @ b) for t in np.linspace(0, T, 9)], axis=0)
     impulse = disturbance * T + late_impulse
-    Q = np.outer(b, b) * impulse**2 + 1e-12 * impulse**2 * np.eye(n)
+    # Each mode is also disturbed on its own: what the booms did at first must be found out too.
+    Q = impulse**2 * (np.outer(b, b) + _UNKNOWN**2 * np.diag(b**2) + 1e-12 * np.eye(n))
     P = scipy.linalg.solve_discrete_are(F.T, C.T, Q, np.diag(noise**2))
     L = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(noise**2))
     step = (np.eye(n) - L @ C) @ F

@@ -18,7 +18,7 @@ def system_of(
     thresholds: tuple[float, ...] = (),
     levels: tuple[float, ...],
 ) -> RelaySystem:
-    """Builds a relay system from a reduced model with one rigid coordinate.
+    """Builds a relay system from a reduced model and the one rigid coordinate a channel drives.
 
     Args:
         model: The reduced model.
@@ -28,10 +28,11 @@ def system_of(
         levels: Acceleration of the rigid coordinate in each band, rad/s^2.
 
     Raises:
-        ValueError: If the model has several rigid coordinates.
+        ValueError: If the channel drives several rigid coordinates, or a mode is overdamped.
     """
     eigenvalues, drive, shapes = modal_form(model, channel)
-    rows = {name: row_of(model, name, shapes) for name in switching}
+    coordinate = driven_coordinate(model, channel)
+    rows = {name: row_of(model, name, shapes, coordinate) for name in switching}
     s = Row(
         angle=sum(k * rows[name].angle for name, k in switching.items()),
         rate=sum(k * rows[name].rate for name, k in switching.items()),
@@ -52,23 +53,41 @@ def modal_form(
     """Returns eigenvalues, drive at unit rigid acceleration, and complex shapes of the modes.
 
     Args:
-        model: The reduced model, underdamped, with one rigid coordinate.
+        model: The reduced model, underdamped.
         channel: The input.
 
     Raises:
-        ValueError: If the model has several rigid coordinates or an overdamped mode.
+        ValueError: If the channel drives several rigid coordinates, or a mode is overdamped.
     """
-    k = len(model.frequencies)
-    if len(model.B) - k != 1:
-        raise ValueError(f"a relay system has one rigid coordinate, the model {len(model.B) - k}")
+    k, coordinate = len(model.frequencies), driven_coordinate(model, channel)
     B = model.B[:, model.inputs.index(channel)]
     A = np.block([[np.zeros((k, k)), np.eye(k)], [-np.diag(model.frequencies**2), -model.D]])
     values, vectors = np.linalg.eig(A)
     upper = np.imag(values) > 0
     if np.count_nonzero(upper) != k:
         raise ValueError("an elastic mode is overdamped; the modal form needs conjugate pairs")
-    drive = (np.linalg.inv(vectors) @ np.r_[np.zeros(k), B[1:]])[upper] / B[0]
+    drive = (np.linalg.inv(vectors) @ np.r_[np.zeros(k), B[len(B) - k :]])[upper] / B[coordinate]
     return tuple(values[upper].tolist()), tuple(drive.tolist()), vectors[:, upper]
+
+
+def driven_coordinate(model: ReducedModel, channel: str) -> int:
+    """Returns the index of the rigid coordinate that a channel drives.
+
+    Args:
+        model: The reduced model.
+        channel: The input.
+
+    Raises:
+        ValueError: If it drives none, or several.
+    """
+    rigid = len(model.B) - len(model.frequencies)
+    push = np.abs(model.B[:rigid, model.inputs.index(channel)])
+    driven = np.flatnonzero(push > 1e-9 * push.max(initial=0.0))
+    if len(driven) != 1:
+        raise ValueError(
+            f"{channel!r} drives {len(driven)} rigid coordinates of {rigid}; a relay system has one"
+        )
+    return int(driven[0])
 
 
 def real_form(system: RelaySystem, rows: Sequence[Row]) -> tuple[Array, Array, Array]:
@@ -92,18 +111,19 @@ def real_form(system: RelaySystem, rows: Sequence[Row]) -> tuple[Array, Array, A
     return A, b, C
 
 
-def row_of(model: ReducedModel, reading: str, shapes: Array) -> Row:
+def row_of(model: ReducedModel, reading: str, shapes: Array, coordinate: int = 0) -> Row:
     """Returns a reading as a row over the states of a relay system.
 
     Args:
         model: The reduced model.
         reading: Name of the reading.
         shapes: Complex modal shapes, as `modal_form` gives them.
+        coordinate: Index of the rigid coordinate, as `driven_coordinate` gives it.
     """
-    n = len(model.B)
+    n, k = len(model.B), len(model.frequencies)
     C = model.C[list(model.outputs).index(reading)]
     return Row(
-        angle=float(C[0]),
-        rate=float(C[n]),
-        modes=tuple((np.r_[C[1:n], C[n + 1 :]] @ shapes).tolist()),
+        angle=float(C[coordinate]),
+        rate=float(C[n + coordinate]),
+        modes=tuple((np.r_[C[n - k : n], C[2 * n - k :]] @ shapes).tolist()),
     )

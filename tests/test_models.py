@@ -155,6 +155,22 @@ def test_figures_of_the_readme_are_those_of_the_compiled_machine():
     assert ", ".join(f"{omega:.6f}" for omega in FREQUENCIES) in text
 
 
+def test_first_mode_of_the_twin_has_the_printed_coefficients():
+    linear = linearize.linearize(flight("two_boom_twin"))
+    model = truncate(
+        M=linear.M, D=linear.D, K=linear.K, B=linear.B, C=linear.C, y0=linear.y0,
+        outputs=linear.outputs, inputs=linear.actuators, rigid=linear.rigid, modes=1,
+    )  # fmt: skip
+    text = readme("two_boom_twin")
+    assert f"{model.inertia[0]:.4f} kg m^2" in text
+    assert f"{flight('two_boom_twin').body_mass.sum():.5f} kg" in text
+    # Printed (5.1): omega^2 = J c/(J a - 2 p^2) and damping b/c, with digits of 1e-4.
+    J, p, a, b, c = 1183.24, 22.335, 11.06, 0.72, 38.83
+    omega = np.sqrt(J * c / (J * a - 2 * p**2))
+    assert model.frequencies[0] == pytest.approx(omega, rel=2e-4)
+    assert model.D[0, 0] / model.frequencies[0] ** 2 == pytest.approx(b / c, rel=2e-4)
+
+
 @pytest.mark.parametrize("name", TWINS)
 def test_actuators_and_sensors_are_named_as_described(name):
     _, actuators, sensors = TWINS[name]
