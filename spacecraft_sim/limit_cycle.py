@@ -1,20 +1,28 @@
 """Symmetric limit cycles of a delayed relay with elastic modes, their stability, the delay margin.
 
-On a half period P the input is constant, -p after s has risen through zero a delay h earlier, and
-the motion is antisymmetric: x(P) = -x(0).  That fixes x(0) in closed form, and P is a root of
-s(P - h) = 0.  Small deviations from one zero of s to the next are multiplied by
-W = (I - x' c/(c x')) e^(A P), x' the velocity at the zero (Tsypkin; Astrom): the cycle is stable if
-the eigenvalues of W lie inside the unit circle.
+On a half period P the input is constant, -p, and the motion is antisymmetric: x(P) = -x(0).  That
+fixes x(0) in closed form.  With the delay h = m P + theta, 0 <= theta < P, the command of each turn
+was given m half periods and theta earlier, so P is a root of s(P - theta) = 0, where s falls if m
+is even and rises if m is odd.
+
+A deviation xi at a zero of s shifts it by tau = -c xi/(c x'), and the turn that it commands by as
+much: xi(n+1) = -(e^(A P) xi(n) + (-1)^m 2 p e^(A (P - theta)) b tau(n - m)).  The cycle is stable
+if all eigenvalues of this map but the one of a mere shift in time lie inside the unit circle.
 """
 
 import cmath
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
+import scipy.linalg
 
 from spacecraft_sim.checks import positive
+from spacecraft_sim.modal_form import real_form
 from spacecraft_sim.relay_system import RelaySystem, Row, State, propagate
 
 Array = np.ndarray
@@ -43,6 +51,13 @@ class LimitCycle:
         """Whether small deviations die out."""
         return self.multiplier < 1
 
+    @property
+    def pending(self) -> list[tuple[float, float]]:
+        """Commands under way at the start: (time of effect, s, acceleration, rad/s^2)."""
+        P, p = self.period / 2, self.system.levels[0]
+        turns = math.floor(self.delay / P)
+        return [(k * P, p if k % 2 else -p) for k in range(1, turns + 1)]
+
     def peak(self, row: Row) -> float:
         """Returns the largest |row . state| over the cycle, found and not sampled.
 
@@ -62,15 +77,21 @@ class LimitCycle:
 
 
 def limit_cycles(
-    system: RelaySystem, *, delay: float, longest: float | None = None
+    system: RelaySystem,
+    *,
+    delay: float,
+    shortest: float | None = None,
+    longest: float | None = None,
 ) -> list[LimitCycle]:
     """Finds the symmetric limit cycles at the relay's lowest level.
 
     Args:
         system: Plant and relay; thresholds are ignored.
         delay: h, s.
-        longest: Longest half period that is looked for, s; by default well beyond that of the
-            rigid body, or 1000 h where that has none.
+        shortest: Shortest half period that is looked for, s; by default the delay, or, if that is
+            less, half the half period of the fastest mode.
+        longest: Longest half period, s; by default well beyond that of the rigid body, with modes
+            at most 1000 h.
 
     Returns:
         The cycles in the order of their periods; there may be several, or none.
@@ -79,46 +100,55 @@ def limit_cycles(
         ValueError: If the delay is not positive.
     """
     positive(delay=delay)
+    fastest = max((abs(x) for x in system.eigenvalues), default=0.0)
     c = system.switching.angle / system.switching.rate if system.switching.rate else math.inf
     rigid = delay * (2 - c * delay) / (1 - c * delay) if c * delay < 1 else math.inf
-    longest = longest or min(4 * rigid, 1000 * delay)
-    fastest = max((abs(x) for x in system.eigenvalues), default=0.0)
-    grid = np.linspace(delay, longest, 400 + math.ceil(2 * fastest * (longest - delay)))
-    values = [_s_at_return(system, delay, P) for P in grid]
-    found = []
-    for k in np.flatnonzero(np.diff(np.sign(values))):
-        P = _root(lambda P: _s_at_return(system, delay, P), grid[k], grid[k + 1])
-        start = _antisymmetric(system, P)
-        if _is_cycle(system, start, P, delay):
-            multiplier = _multiplier(system, start, P, delay)
-            found.append(LimitCycle(
-                period=2 * P, start=start, multiplier=multiplier, delay=delay, system=system
-            ))  # fmt: skip
+    cap = 1000 * delay if fastest or rigid == math.inf else math.inf
+    longest = longest or min(4 * rigid, cap)
+    shortest = shortest or (min(delay, math.pi / (2 * fastest)) if fastest else delay)
+    points = 400 + math.ceil(2 * fastest * (longest - shortest))
+    turns = [delay / m for m in range(1, math.floor(delay / shortest) + 1)]  # theta jumps there
+    edges = sorted({shortest, longest, *(P for P in turns if shortest < P < longest)})
+    found: list[LimitCycle] = []
+    for low, high in pairwise(edges):
+        share = max(20, math.ceil(points * (high - low) / (longest - shortest)))
+        # Just off the jumps, each smooth stretch on its own.
+        grid = np.linspace(low * (1 + 1e-12), high * (1 - 1e-12), share)
+        values = _s_at_return(system, delay, grid)
+        for k in np.flatnonzero(np.diff(np.signbit(values))):
+            P = _root(partial(_s_at_return, system, delay), grid[k], grid[k + 1])
+            start = _antisymmetric(system, P)
+            if _is_cycle(system, start, P, delay):
+                multiplier = _multiplier(system, start, P, delay)
+                found.append(LimitCycle(
+                    period=2 * P, start=start, multiplier=multiplier, delay=delay, system=system
+                ))  # fmt: skip
     return found
 
 
 def delay_margin(system: RelaySystem, *, upper: float) -> float:
-    """Returns the delay up to which the relay settles in a stable symmetric limit cycle, s.
+    """Returns the delay up to which the relay has a stable symmetric limit cycle, s.
+
+    Longer delays may have one again; the margin is where it is first lost.
 
     Args:
         system: Plant and relay.
-        upper: Delay that is surely too long, s.
+        upper: Longest delay that is tried, s.
 
     Raises:
-        ValueError: If there is no stable cycle at small delays, or still one at `upper`.
+        ValueError: If there is no stable cycle at small delays, or one at every delay tried.
     """
 
     def settles(h: float) -> bool:
         return any(cycle.stable for cycle in limit_cycles(system, delay=h))
 
-    if settles(upper):
-        raise ValueError(f"a stable limit cycle exists even at upper = {upper} s; raise it")
-    ladder = np.geomspace(upper / 1000, upper, 60)
-    held = list(map(settles, ladder))
-    if not held[0]:
+    ladder = np.geomspace(upper / 1000, upper, 200)
+    lost = next((k for k, h in enumerate(ladder) if not settles(h)), None)
+    if lost is None:
+        raise ValueError(f"a stable limit cycle exists at every delay up to {upper} s; raise upper")
+    if lost == 0:
         raise ValueError(f"no stable limit cycle even at a delay of {ladder[0]:.3g} s")
-    k = held.index(False)
-    low, high = ladder[k - 1], ladder[k]
+    low, high = ladder[lost - 1], ladder[lost]
     while high - low > 1e-9 * high:
         low, high = (mid, high) if settles(mid := (low + high) / 2) else (low, mid)
     return float(low)
@@ -143,18 +173,26 @@ def _state_at(system: RelaySystem, start: State, tau: float) -> State:
     return State(start.angle + tau * (start.rate - tau * p / 2), start.rate - p * tau, tuple(modes))
 
 
-def _s(row: Row, x: State) -> float:
-    modal = sum((d * z).real for d, z in zip(row.modes, x.modes, strict=False))
-    return row.angle * x.angle + row.rate * x.rate + 2 * modal
+def _turns_under_way(P: float, delay: float) -> tuple[int, float]:
+    """M and theta of h = m P + theta."""
+    m = math.floor(delay / P)
+    return m, delay - m * P
 
 
-def _s_at_return(system: RelaySystem, delay: float, P: float) -> float:
-    """Returns s a delay before the input turns back: zero for a cycle."""
-    return _s(system.switching, _state_at(system, _antisymmetric(system, P), P - delay))
+def _s_at_return(system: RelaySystem, delay: float, P: Array | float) -> Array | float:
+    """S at the instant P - theta, at which the turn m half periods later was commanded."""
+    tau, p, row = P - delay % P, system.levels[0], system.switching
+    s = row.angle * tau * (p * P / 2 - tau * p / 2) + row.rate * (p * P / 2 - p * tau)
+    for d, exponent, b in zip(row.modes, system.eigenvalues, system.drive, strict=False):
+        rest, growth = b * p / exponent, np.exp(exponent * P)
+        start = rest * (growth - 1) / (growth + 1)
+        s = s + 2 * (d * (rest + (start - rest) * np.exp(exponent * tau))).real
+    return s
 
 
 def _is_cycle(system: RelaySystem, start: State, P: float, delay: float) -> bool:
-    """Whether s, positive since a delay before the start, first falls to zero at P - h."""
+    """Whether s has the right sign at the start and changes it at P - theta alone."""
+    m, theta = _turns_under_way(P, delay)
     run = propagate(
         RelaySystem(
             switching=system.switching,
@@ -167,31 +205,35 @@ def _is_cycle(system: RelaySystem, start: State, P: float, delay: float) -> bool
         delay=2 * P,
         acting=-system.levels[0],
     )
-    if run.commands[0] > 0:  # s already negative at the start
+    if len(run.switch_times) != 2 or (run.commands[0] < 0) != (m % 2 == 0):
         return False
-    first = run.switch_times[1] if len(run.switch_times) > 1 else math.inf
-    # Over the delay before the start s must have been positive too: antisymmetry, s(P + t) = -s(t).
-    return abs(first - (P - delay)) < 1e-7 * P and len(run.switch_times) == 2
+    return abs(run.switch_times[1] - (P - theta)) < 1e-7 * P
 
 
 def _multiplier(system: RelaySystem, start: State, P: float, delay: float) -> float:
     """Largest |eigenvalue| of the map of deviations from one zero of s to the next."""
-    k, row = len(system.eigenvalues), system.switching
-    x = _state_at(system, start, P - delay)
-    values = np.array([*system.eigenvalues, *np.conj(system.eigenvalues)])
-    modes = np.array([*x.modes, *np.conj(x.modes)])
-    drive = np.array([*system.drive, *np.conj(system.drive)])
-    p = system.levels[0]
-    velocity = np.r_[x.rate, -p, values * modes - drive * p]
-    d = np.array(row.modes) if row.modes else np.zeros(k)
-    gradient = np.r_[row.angle, row.rate, d, np.conj(d)]
-    flow = np.diag(np.r_[1, 1, np.exp(values * P)]).astype(complex)
-    flow[0, 1] = P
-    projector = np.eye(2 + 2 * k) - np.outer(velocity, gradient) / (gradient @ velocity)
-    return float(np.max(np.abs(np.linalg.eigvals(projector @ flow))))
+    (m, theta), row, p = _turns_under_way(P, delay), system.switching, system.levels[0]
+    A, b, (c,) = real_form(system, [row])
+    x = _state_at(system, start, P - theta)
+    parts = [part for z in x.modes for part in (z.real, z.imag)]
+    velocity = A @ np.array([x.angle, x.rate, *parts]) - b * p
+    velocity *= -1 if m % 2 == 0 else 1  # at a rising zero
+    n = len(b)
+    step = np.zeros((n + m, n + m))  # (xi, tau of the last m zeros, the latest first)
+    late = -((-1) ** m) * 2 * p * scipy.linalg.expm(A * (P - theta)) @ b
+    shift = -c / (c @ velocity)
+    step[:n, :n] = -scipy.linalg.expm(A * P)
+    if m == 0:
+        step[:n, :n] += np.outer(late, shift)
+    else:
+        step[:n, -1] = late
+        step[n, :n] = shift
+        step[n + 1 :, n:-1] = np.eye(m - 1)
+    values = np.linalg.eigvals(step)
+    return float(np.max(np.abs(np.delete(values, np.argmin(np.abs(values - 1))))))
 
 
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
+def _root(function: Callable[[float], Any], low: float, high: float) -> float:
     from scipy.optimize import brentq
 
     return brentq(function, low, high, xtol=1e-15)  # pyright: ignore[reportReturnType]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from spacecraft_sim.checks import choices
 from spacecraft_sim.reduced import ReducedModel
 from spacecraft_sim.relay_system import RelaySystem, Row
 
@@ -80,6 +81,8 @@ def driven_coordinate(model: ReducedModel, channel: str) -> int:
     Raises:
         ValueError: If it drives none, or several.
     """
+    if channel not in model.inputs:
+        raise ValueError(choices("input", channel, model.inputs, where="the reduced model"))
     rigid = len(model.B) - len(model.frequencies)
     push = np.abs(model.B[:rigid, model.inputs.index(channel)])
     driven = np.flatnonzero(push > 1e-9 * push.max(initial=0.0))
@@ -119,8 +122,13 @@ def row_of(model: ReducedModel, reading: str, shapes: Array, coordinate: int = 0
         reading: Name of the reading.
         shapes: Complex modal shapes, as `modal_form` gives them.
         coordinate: Index of the rigid coordinate, as `driven_coordinate` gives it.
+
+    Raises:
+        ValueError: If there is no such reading.
     """
     n, k = len(model.B), len(model.frequencies)
+    if reading not in model.outputs:
+        raise ValueError(choices("reading", reading, model.outputs, where="the reduced model"))
     C = model.C[list(model.outputs).index(reading)]
     return Row(
         angle=float(C[coordinate]),

@@ -111,8 +111,7 @@ def test_a_callable_delay_is_checked_when_it_is_used(delay, message):
 def test_a_callable_delay_that_runs_backwards_is_found_when_commands_cross():
     arrive = arrival(lambda t: 0.25 + 0.2 * math.sin(20 * t))  # h' up to 4
     with pytest.raises(ValueError, match=r"runs backwards.*at \d\.\d+ s before \d\.\d+ s"):
-        for t in np.linspace(0, 2, 200).tolist():
-            arrive(t)
+        list(map(arrive, np.linspace(0, 2, 200).tolist()))
 
 
 def test_order_is_kept_apart_for_each_line():
