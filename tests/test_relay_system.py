@@ -19,7 +19,8 @@ from spacecraft_sim.scenario import Initial
 
 ANGLE, RATE = "quasi_rigid_angle_z", "quasi_rigid_rate_z"
 # Section 5 of Efremov et al. 2006: one mode, five levels, per unit of inertia.
-PRINTED = beam.Galerkin(1183.24, *(np.array([x]) for x in (22.335, 11.06, 0.72, 38.83)))
+TONE = {"p": 22.335, "a": 11.06, "b": 0.72, "c": 38.83}
+PRINTED = beam.Galerkin(J=1183.24, **{name: np.array([x]) for name, x in TONE.items()})
 THRESHOLDS = tuple(0.0045 * 3**i for i in range(4))
 LEVELS = tuple(0.007 * 3**k for k in range(5))
 RIGID = RelaySystem(switching=Row(angle=0.31, rate=1.0), levels=(0.007,))
@@ -227,16 +228,16 @@ def delays():
     wave = Delay(mean=0.3, amplitude=0.15, frequency=3.0, phase=0.7)
     yield "sinusoidal", wave, wave.arrival
 
-    def sum_of_two(t):
+    def waves(t):
         return 0.3 + 0.08 * math.sin(2 * t) + 0.05 * math.sin(5 * t + 1)
 
     def arrive(t):
         a = t + 0.3
         for _ in range(200):  # contracts by h' <= .41 a time: 200 leave nothing
-            a = t + sum_of_two(a)
+            a = t + waves(a)
         return a
 
-    yield "callable", sum_of_two, arrive
+    yield "callable", waves, arrive
 
 
 DELAYS = {name: rest for name, *rest in delays()}
@@ -284,7 +285,6 @@ def test_disturbances_against_adaptive_integration(modes, torque, steps):
     )
     assert len(run.switch_times) == len(switches)
     assert run.switch_times == pytest.approx(switches, abs=1e-9)
-    # 1e-9 s of a motion of frequencies around 1 rad/s.
     assert final(run) == pytest.approx(x, abs=1e-9 * max(np.abs(x)))
 
 
@@ -310,8 +310,7 @@ def test_a_square_wave_is_refused_or_flown_as_one():
         run = propagate(RIGID, **given, disturbance=torque)
     except ValueError as error:
         assert "square" in str(error)  # noqa: PT017
-        return
-    # The same run but for the rounding of the edges, some 1e-15 s each.
+        return  # else the same run, but for the rounding of the edges, some 1e-15 s each
     assert run.switch_times == pytest.approx(exact.switch_times, abs=1e-11)
 
 
