@@ -86,8 +86,17 @@ def design_local(
     model = model or double_integrator()
     E, p = math.exp(c * max_delay), 1.5 * c**2 * accuracy
     parameters = (Assumption(text="c h0 < ln(6/5)", value=c * max_delay, limit=math.log(6 / 5)),)
-    _require(parameters, "Theorem 1")
     law = _law(model, c, (), p, attraction_level, compensated_delay, period)
+    # The pulses are still under way when feedback begins (erratum 17).
+    pending = Assumption(
+        text="pending commands |u| <= p",
+        value=law.attraction,
+        limit=p,
+        relation="<=",
+        unit="rad/s^2",
+    )
+    parameters = (*parameters, pending, *_units(model))
+    _require(parameters, "Theorem 1")
     delta = c * accuracy * (6 - 5 * E) / (4 * E)
 
     def entry(beta: float, v: float) -> tuple[Assumption, ...]:
@@ -96,13 +105,9 @@ def design_local(
             Assumption(text="|s| < delta_0 at first", value=abs(c * beta + v), limit=delta),
         )
 
-    pending = Assumption(
-        text="pending commands |u| <= p", value=law.attraction, limit=p, relation="<=",
-        unit="rad/s^2",
-    )  # fmt: skip
     theorem = Theorem(
         source=f"{PAPER}, Theorem 1",
-        parameters=(*parameters, pending, *_hardware(law, thrusters, max_delay)),
+        parameters=(*parameters, *_hardware(law, thrusters, max_delay)),
         max_delay=max_delay,
         accuracy=accuracy,
         settling=lambda beta, v: 0.0,
@@ -168,6 +173,7 @@ def design_nonlocal(
         Assumption(text="eps < R", value=accuracy, limit=radius),
         Assumption(text="c h0 < ln(15/14)", value=c * max_delay, limit=math.log(15 / 14)),
         *_gain_window(c * max_delay, readings_of_gain),
+        *_units(model),
     )
     _require(parameters, "Theorem 2")
     R0 = (c + 1) * radius
@@ -212,6 +218,15 @@ def settling_time(beta: float, v: float, *, c: float, accuracy: float) -> float:
     """
     start = max(abs(beta), abs(v), accuracy)
     return 1.25 * (math.log(start / accuracy) + 1) / c
+
+
+def _units(model: ReducedModel) -> tuple[Assumption, ...]:
+    """That the law is fed beta/J and v/J: a torque of 1 N m makes v/J grow by 1/J."""
+    if "angular_momentum_z" not in model.outputs:
+        return ()
+    torque = model.gain(CHANNEL, "angular_momentum_z")
+    error = abs(model.gain(CHANNEL, RATE) * float(model.inertia[-1]) / torque - 1)
+    return (Assumption(text="units: v is momentum over inertia", value=error, limit=1e-6),)
 
 
 def _gain_window(x: float, readings: dict[str, float]) -> tuple[Assumption, ...]:

@@ -78,8 +78,7 @@ def test_export_writes_one_file_that_plain_mujoco_flies(name, tmp_path, capsys):
     assert [p.name for p in tmp_path.iterdir()] == ["machine.xml"]
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
-    # Bus and booms; all digits of every number are written, so what is left is rounding.
-    density = 0.137428 if name == "two_boom_twin" else 1.53
+    density = 0.137428 if name == "two_boom_twin" else 1.53  # all digits are written: rounding
     assert np.sum(model.body_mass) == pytest.approx(100 + 2 * density * 7.5, rel=1e-13)
     data.ctrl[:] = 1.0
     mujoco.mj_step(model, data, 10)
