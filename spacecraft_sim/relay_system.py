@@ -85,9 +85,10 @@ class RelaySystem:
         ):
             if len(parts) != n and (parts or name == "drive"):
                 raise ValueError(f"{n} eigenvalues need {n} {name}, got {len(parts)}")
-        growing = [x for x in self.eigenvalues if x.real > 0]
-        if growing:
-            raise ValueError(f"eigenvalues must not grow, Re <= 0; got {growing}")
+        positive(**{f"levels[{k}]": p for k, p in enumerate(self.levels)})
+        wrong = [x for x in self.eigenvalues if not (x.real <= 0 and x != 0)]
+        if wrong:
+            raise ValueError(f"eigenvalues must have Re <= 0 and not be zero; got {wrong}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,7 +144,12 @@ class Run:
 
         Returns:
             The largest absolute value and its time, s.
+
+        Raises:
+            ValueError: If the run ends before `after`.
         """
+        if after > self.times[-1]:
+            raise ValueError(f"after = {after} s, but the run ends at {self.times[-1]} s")
         steady = _Steady(self.system, self.periodic)
         worst, when = -1.0, after
         for k in range(len(self.inputs)):
@@ -185,7 +191,7 @@ def propagate(
         system: Plant and relay.
         start: State at t = 0.
         duration: Length of the run, s.
-        delay: h, s: constant, sinusoidal, or any function with h >= 0 and h' < 1.
+        delay: h, s: constant, sinusoidal, or any function with h > 0 and h' < 1.
         pending: Commands still under way at t = 0: (time of effect, acceleration), ascending.
         acting: Acceleration in force at t = 0, rad/s^2.
         feedback_from: Time of the first feedback command, s; before it `pending` alone acts.
@@ -199,6 +205,11 @@ def propagate(
         ValueError: If the delay is negative or runs backwards, or an input is out of order.
     """
     positive(duration=duration)
+    given = [start.angle, start.rate, *start.modes, acting, *(x for pair in pending for x in pair)]
+    if not all(map(cmath.isfinite, given)):
+        raise ValueError(
+            f"start, acting and pending must be finite, got {start}, {acting}, {pending}"
+        )
     if len(start.modes) != len(system.eigenvalues):
         raise ValueError(
             f"start has {len(start.modes)} modal coordinates, the system {len(system.eigenvalues)}"
