@@ -13,7 +13,7 @@ from spacecraft_sim.disturbance import Torque
 from spacecraft_sim.relay_system import RelaySystem, Row, State, propagate
 
 ULP = 2.0**-52
-LOCATED = 1e-13  # Newton's last step is taken from 1e-7 (1e-3 + tau) away, trusted to 1e-6
+LOCATED = 1e-15  # the march stops within 1e-16 (1 + tau) of the exit; a few roundings of the clock
 INF = math.inf
 
 
