@@ -51,6 +51,7 @@ class Disturbance:
     def __init__(self, torques: Mapping[Any, Torque]):
         self.names = tuple(f"disturbance_{axis}" for axis in torques)
         self._torques = tuple(torques.values())
+        self._jumping = tuple(t for t in self._torques if t.waveform == "square")
         smooth = [t for t in self._torques if t.amplitude and t.waveform == "sine"]
         fastest = max((abs(t.frequency) for t in smooth), default=0.0)
         self.longest = _RESOLVED / fastest if fastest else math.inf
@@ -69,7 +70,7 @@ class Disturbance:
         Args:
             t: Time, s.
         """
-        return min((torque.next_edge(t) for torque in self._torques), default=math.inf)
+        return min((torque.next_edge(t) for torque in self._jumping), default=math.inf)
 
     def line(self, t0: float, t1: float) -> tuple[list[float], list[float]]:
         """Returns value at `t0` and rate of the straight line that stands for the torque.

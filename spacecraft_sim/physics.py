@@ -93,7 +93,7 @@ class MujocoPhysics(dm_mujoco.Physics):
         self._held = [0.0] * len(self.inputs)
         self._timestep = model.opt.timestep
 
-    def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]:
+    def select(self, names: tuple[str, ...]) -> Callable[[], Sequence[float]]:
         """Returns a function that reads the named readings.
 
         Args:
@@ -104,7 +104,7 @@ class MujocoPhysics(dm_mujoco.Physics):
         """
         return self._readings.select(names)
 
-    def read(self) -> list[float]:
+    def read(self) -> Sequence[float]:
         """Returns all readings in the order of `units`."""
         return self._all()
 
@@ -217,16 +217,14 @@ class MujocoPhysics(dm_mujoco.Physics):
         Raises:
             PhysicsError: Saying when it was found not to be.
         """
-        with np.errstate(over="ignore", invalid="ignore"):
-            size = float(self._qvel.dot(self._qvel) + self._qpos.dot(self._qpos))
-        if not size < _HUGE**2:  # also true for NaN
+        if not math.hypot(*self._qvel.tolist()) < _HUGE:  # also true for NaN
             raise control.PhysicsError(
-                f"the MuJoCo plant diverged before t = {self.time():.6g} s: its coordinates or "
-                f"velocities are not finite or beyond {_HUGE:g}"
+                f"the MuJoCo plant diverged before t = {self.time():.6g} s: its velocities are not "
+                f"finite or beyond {_HUGE:g}"
             )
 
 
-_HUGE = 1e6  # rad, m, rad/s, m/s: no spacecraft gets there
+_HUGE = 1e6  # rad/s or m/s: no spacecraft gets there
 _VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 _STATE = int(mujoco.mjtState.mjSTATE_PHYSICS | mujoco.mjtState.mjSTATE_TIME)
 

@@ -16,6 +16,7 @@ turn:
 # (MuJoCo is a compiled module without type stubs)
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -78,7 +79,7 @@ class Readings:
                 raise ValueError(f"two sensors give the readings {sorted(twice)}; rename one")
             self.units |= block.units
 
-    def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]:
+    def select(self, names: tuple[str, ...]) -> Callable[[], Sequence[float]]:
         """Returns a function that reads the named readings from the data as it then is.
 
         Args:
@@ -92,15 +93,14 @@ class Readings:
                 raise ValueError(choices("sensor", name, self.units, where="the model"))
         used = [block for block in self._blocks if block.units.keys() & set(names)]
         order = [name for block in used for name in block.units]
-        reads, picks = [block.read for block in used], [order.index(name) for name in names]
-        if picks == list(range(len(order))):
-            return lambda: [value for read in reads for value in read()]
-
-        def selected() -> list[float]:
-            values = [value for read in reads for value in read()]
-            return [values[k] for k in picks]
-
-        return selected
+        reads = [block.read for block in used]
+        if len(names) < 2:  # itemgetter gives no sequence of one
+            places = [order.index(name) for name in names]
+            return lambda: [[x for read in reads for x in read()][k] for k in places]
+        pick = operator.itemgetter(*(order.index(name) for name in names))
+        if len(reads) == 1:
+            return lambda read=reads[0]: pick(read())
+        return lambda: pick([x for read in reads for x in read()])
 
 
 def _sensors(model: mujoco.MjModel, data: mujoco.MjData) -> list[Block]:

@@ -85,7 +85,7 @@ class RelaySystem:
         ):
             if len(parts) != n and (parts or name == "drive"):
                 raise ValueError(f"{n} eigenvalues need {n} {name}, got {len(parts)}")
-        positive(**{f"levels[{k}]": p for k, p in enumerate(self.levels)})
+        positive(lowest_level=min(self.levels))
         wrong = [x for x in self.eigenvalues if not (x.real <= 0 and x != 0)]
         if wrong:
             raise ValueError(f"eigenvalues must have Re <= 0 and not be zero; got {wrong}")

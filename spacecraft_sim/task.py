@@ -77,6 +77,7 @@ class ControlTask(control.Task):
         self._impulse = [0.0] * len(wanted)
         self._spent = [0.0] * len(self._thrusters.names)
         self._samples = 0
+        self._unknown_slope = self._controller.period is None
         self._decide(physics.time())
         self._record(physics)
 
@@ -139,8 +140,9 @@ class ControlTask(control.Task):
             stop = min(
                 end, self._edge, sample, jump, t + disturbance.longest, _foreseen(self._trace)
             )
-            if period is None and len(self._trace) == 1:
+            if self._unknown_slope:
                 stop = min(stop, t + probe)
+                self._unknown_slope = False
             torque, rate = disturbance.line(t, stop)
             value, rates = self._thrust + torque, self._slope + rate
             physics.begin(value, rates)
@@ -157,6 +159,8 @@ class ControlTask(control.Task):
                 self._follow_thrust(t)
             if decided or landed:
                 self._trace = self._trace[-1:]
+                # From a zero of its own the event function can only come back once, which shows.
+                self._unknown_slope = landed and period is None
                 self._record(physics)
         self._record(physics)
 
