@@ -93,7 +93,7 @@ class MujocoPhysics(dm_mujoco.Physics):
         self._held = [0.0] * len(self.inputs)
         self._timestep = model.opt.timestep
 
-    def select(self, names: tuple[str, ...]) -> Callable[[], Sequence[float]]:
+    def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]:
         """Returns a function that reads the named readings.
 
         Args:
@@ -104,7 +104,7 @@ class MujocoPhysics(dm_mujoco.Physics):
         """
         return self._readings.select(names)
 
-    def read(self) -> Sequence[float]:
+    def read(self) -> list[float]:
         """Returns all readings in the order of `units`."""
         return self._all()
 
@@ -217,9 +217,9 @@ class MujocoPhysics(dm_mujoco.Physics):
         Raises:
             PhysicsError: Saying when it was found not to be.
         """
-        if not math.hypot(*self._qvel.tolist()) < _HUGE:  # also true for NaN
+        if not math.hypot(*self._qvel.tolist(), *self._qpos.tolist()) < _HUGE:  # NaN too
             raise control.PhysicsError(
-                f"the MuJoCo plant diverged before t = {self.time():.6g} s: its velocities are not "
+                f"the MuJoCo plant diverged before t = {self.time():.6g} s: its state is not "
                 f"finite or beyond {_HUGE:g}"
             )
 

@@ -19,7 +19,7 @@ class Plant(Protocol):
     inputs: tuple[str, ...]
     units: dict[str, str]
 
-    def select(self, names: tuple[str, ...]) -> Callable[[], Sequence[float]]:
+    def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]:
         """Returns a function that reads the named readings.
 
         Args:

@@ -79,7 +79,7 @@ class Readings:
                 raise ValueError(f"two sensors give the readings {sorted(twice)}; rename one")
             self.units |= block.units
 
-    def select(self, names: tuple[str, ...]) -> Callable[[], Sequence[float]]:
+    def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]:
         """Returns a function that reads the named readings from the data as it then is.
 
         Args:
@@ -99,8 +99,8 @@ class Readings:
             return lambda: [[x for read in reads for x in read()][k] for k in places]
         pick = operator.itemgetter(*(order.index(name) for name in names))
         if len(reads) == 1:
-            return lambda read=reads[0]: pick(read())
-        return lambda: pick([x for read in reads for x in read()])
+            return lambda read=reads[0]: list(pick(read()))
+        return lambda: list(pick([x for read in reads for x in read()]))
 
 
 def _sensors(model: mujoco.MjModel, data: mujoco.MjData) -> list[Block]:
