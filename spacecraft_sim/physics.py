@@ -167,8 +167,7 @@ class MujocoPhysics(dm_mujoco.Physics):
             mujoco.mj_step1(model, data)
         self._moved = True
         span = t - self._opening
-        # The small allowance keeps rounding of the clock from adding a step.
-        steps = math.ceil(span / self._timestep - 1e-9) or 1
+        steps = math.ceil(span / self._timestep - _STRETCH) or 1
         self._option.timestep = span / steps
         # What depends on position and velocity is up to date: the first step need not repeat it.
         mujoco.mj_forwardSkip(model, data, _VELOCITY_STAGE, 1)
@@ -224,6 +223,7 @@ class MujocoPhysics(dm_mujoco.Physics):
             )
 
 
+_STRETCH = 0.1  # share of a step by which the last of a piece may be overdrawn rather than add one
 _HUGE = 1e6  # rad/s or m/s: no spacecraft gets there
 _VELOCITY_STAGE = int(mujoco.mjtStage.mjSTAGE_VEL)
 _STATE = int(mujoco.mjtState.mjSTATE_PHYSICS | mujoco.mjtState.mjSTATE_TIME)

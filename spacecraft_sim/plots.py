@@ -90,7 +90,7 @@ def _heading(figure: Figure, title: str, verdicts: Sequence[Verdict], y: float) 
 
 
 def _panel(axes: Axes, title: str, x: str, y: str, middle: bool = False) -> None:
-    axes.set_title(title, size=10.5, color=INK, loc="left", weight="bold", pad=5)
+    axes.set_title(title, size=10.5, color=INK, loc="left", y=1.0, weight="bold", pad=5)
     axes.set_xlabel(x, size=9, color=SOFT, labelpad=2)
     axes.set_ylabel(y, size=9, color=SOFT, labelpad=3)
     axes.tick_params(labelsize=8.5, colors=SOFT, length=3)

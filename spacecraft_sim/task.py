@@ -183,7 +183,7 @@ class ControlTask(control.Task):
             points.append(_first_not_positive(carried_to, points))
             if physics.time() != points[-1][0]:
                 physics.advance(points[-1][0])
-        self._trace = points[-3:]
+        self._trace = points[-4:]
         return points[-1][0], points[-1][1] <= 0
 
     def _least_event(self, t: float) -> float:
@@ -257,17 +257,37 @@ _PROBE = 0.05  # share of a control step after which a new smooth stretch is loo
 
 
 def _foreseen(points: Sequence[Point]) -> float:
-    """When the event function will cross zero, extrapolated from its last three points; inf if not.
+    """When the event function will cross zero, extrapolated from its last points; inf if not.
 
     Cutting the piece there spares most of the repetitions that `_first_not_positive` would need.
     The first cut falls just short of the crossing, the next one just behind it.
     """
     if len(points) < 3:
         return math.inf
-    before, last = points[-2:]
-    ahead = _root_of_parabola(last, before, points[-3])
-    near = ahead < 0.05 * (last[0] - before[0])
-    return last[0] + (ahead + WIDTH / 2 if near else (1 - 1e-4) * ahead)
+    t, before = points[-1][0], points[-2]
+    ahead = _root_of_parabola(points[-1], before, points[-3])
+    if ahead < math.inf and len(points) > 3:
+        ahead = _on_cubic(ahead, points)
+    if ahead < 0.05 * (t - before[0]):
+        return t + ahead + WIDTH / 2
+    return t + (1 - 1e-4) * ahead
+
+
+def _on_cubic(ahead: float, points: Sequence[Point]) -> float:
+    """Moves a root of the parabola to the cubic through the last four points, by Newton steps."""
+    (t0, f0), (t1, f1), (t2, f2), (t3, f3) = points[-4:]
+    a, b, c = t3 - t2, t3 - t1, t3 - t0
+    d1, d2, d3 = (f3 - f2) / a, (f2 - f1) / (t2 - t1), (f1 - f0) / (t1 - t0)
+    e1, e2 = (d1 - d2) / b, (d2 - d3) / (t2 - t0)
+    g = (e1 - e2) / c
+    for _ in range(2):
+        u, v, w = ahead, ahead + a, ahead + b
+        value = f3 + u * (d1 + v * (e1 + w * g))
+        slope = d1 + (u + v) * e1 + (u * v + v * w + w * u) * g
+        if slope >= 0:
+            return math.inf
+        ahead -= value / slope
+    return max(ahead, 0.0)
 
 
 def _suspected_dip(points: Sequence[Point]) -> float | None:
