@@ -111,6 +111,7 @@ def design_local(
         max_delay=max_delay,
         accuracy=accuracy,
         settling=lambda beta, v: 0.0,
+        time_source="",
         final_angle=3 * accuracy / 4,
         final_rate=5 * c * accuracy / 4,
         disturbance=c**2 * accuracy / 4,

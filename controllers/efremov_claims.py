@@ -18,6 +18,7 @@ from spacecraft_sim.trajectory import Trajectory, peak
 
 PAPER = "Efremov et al. 2006"
 FINAL = 60.0  # the end of a flight over which final figures are taken, s
+_LEFT_OVER = 1e-3  # share of a limit cycle that its transient, and beta linear in angles, may leave
 
 Measure = Callable[[Trajectory], Measurement]
 
@@ -36,6 +37,8 @@ class Theorem:
         final_rate: Bound of |v| in the end, rad/s.
         disturbance: |f| must stay below this, rad/s^2.
         entry: Hypotheses on (beta, v) at the start of feedback.
+        assumed_delay: Delay that the law counts on and how far off it may be, s, if it does.
+        time_source: Words on where the settling time comes from, if not from the theorem.
     """
 
     source: str
@@ -47,6 +50,8 @@ class Theorem:
     final_rate: float
     disturbance: float
     entry: Callable[[float, float], tuple[Assumption, ...]]
+    assumed_delay: tuple[float, float] | None = None
+    time_source: str = "; time from experiment"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +74,8 @@ class Claims:
         """Returns every claim."""
         theorem, source = self.theorem, self.theorem.source
         claims = [
-            self._claim("|beta/J| < eps from the predicted time on", source, "rad",
+            self._claim("|beta/J| < eps from the predicted time on",
+                        f"{source}{self.theorem.time_source}", "rad",
                         theorem.accuracy, self._after_settling),
             self._claim("|beta/J| in the end", f"{source}, proof", "rad",
                         theorem.final_angle, self._final(ANGLE, RATE)),
@@ -159,21 +165,22 @@ class Claims:
             def measured(trajectory: Trajectory) -> Measurement:
                 f, m = self._disturbance(trajectory), measure(trajectory)
                 error = max((abs(lag - h) for lag in self._lags(trajectory)), default=0.0)
+                settled = self._goes_on(trajectory, FINAL)
                 as_designed = Assumption(
                     text="delay seen in flight is the one designed for, within 1 us",
                     value=error,
                     limit=1e-6,
                     unit="s",
                 )
-                bound = 2 * f / p * predicted + shift * f
-                return Measurement(m.value, m.t_worst, None, bound, (as_designed,))
+                bound = (2 * f / p + _LEFT_OVER) * predicted + shift * f
+                return Measurement(m.value, m.t_worst, None, bound, (as_designed, settled))
 
             return measured
 
         return [
             Guarantee(
                 claim=f"limit cycle: {name}",
-                source=f"{PAPER}, closed form, +-2 f/p",
+                source=f"{PAPER}, closed form, +-(2 f/p + 0.1 %)",
                 unit=unit,
                 kind="within",
                 predicted=value,
@@ -196,13 +203,32 @@ class Claims:
                 limit=self.theorem.disturbance,
                 unit="rad/s^2",
             )
+            intact = Assumption(
+                text="thrust follows the commands: none stays out for longer than h0",
+                value=self._longest_silence(trajectory),
+                limit=self.theorem.max_delay + (self.law.period or 0.0),
+                unit="s",
+            )
             age = Assumption(
                 text="delay seen in flight, and sampling period, < h0",
                 value=max(self._lags(trajectory), default=0.0) + (self.law.period or 0.0),
                 limit=self.theorem.max_delay,
                 unit="s",
             )
-            assumptions = (disturbance, age, *self.theorem.entry(beta, v))
+            assumptions = (disturbance, age, self._goes_on(trajectory, 0.0), intact)
+            if self.theorem.assumed_delay:
+                assumed, error = self.theorem.assumed_delay
+                off = max((abs(lag - assumed) for lag in self._lags(trajectory)), default=0.0)
+                assumptions += (
+                    Assumption(
+                        text="delay as the observer assumes it",
+                        value=off,
+                        limit=error + 1e-9,  # rounding of the clock
+                        relation="<=",
+                        unit="s",
+                    ),
+                )
+            assumptions += self.theorem.entry(beta, v)
             return Measurement(m.value, m.t_worst, m.predicted, m.bound, assumptions)
 
         return measured
@@ -225,8 +251,7 @@ class Claims:
         """Largest |signal| over the last minute; between the rows too where its rate is known."""
 
         def measure(trajectory: Trajectory) -> Measurement:
-            start = self._feedback_start(trajectory) + self._delay()
-            late = trajectory.time >= max(trajectory.time[-1] - FINAL, start)
+            late = trajectory.time >= self._final_start(trajectory)
             if not late.any():
                 return Measurement(math.nan)
             time, x = trajectory.time[late], trajectory[signal][late]
@@ -237,9 +262,27 @@ class Claims:
 
         return measure
 
+    def _final_start(self, trajectory: Trajectory) -> float:
+        """Start of the last minute, not before |beta| < eps is promised, s."""
+        start = self._feedback_start(trajectory)
+        settled = start + self.theorem.settling(*self._state_at(trajectory, start)) + self._delay()
+        return max(float(trajectory.time[-1]) - FINAL, settled)
+
+    def _goes_on(self, trajectory: Trajectory, span: float) -> Assumption:
+        """That a flight goes on for some time after |beta| < eps is promised, to be judged."""
+        start = self._feedback_start(trajectory)
+        promised = start + self.theorem.settling(*self._state_at(trajectory, start)) + self._delay()
+        return Assumption(
+            text="flight goes on after the predicted time",
+            value=float(trajectory.time[-1]) - promised,
+            limit=span,
+            relation=">=",
+            unit="s",
+        )
+
     def _period(self, trajectory: Trajectory) -> Measurement:
         """Mean time between switchings of the thrust to plus, over the last minute."""
-        late = trajectory.time >= trajectory.time[-1] - FINAL
+        late = trajectory.time >= self._final_start(trajectory)
         thrust, time = np.sign(trajectory[self.law.thrusters[0]][late]), trajectory.time[late]
         rising = time[1:][(thrust[1:] > 0) & (thrust[:-1] <= 0)]
         return Measurement(float(np.mean(np.diff(rising))) if len(rising) > 1 else math.nan)
@@ -259,6 +302,20 @@ class Claims:
         followed = time[1:][np.flatnonzero(np.diff(trajectory[channel]))]
         n = min(len(issued), len(followed))
         return (followed[:n] - issued[:n]).tolist()
+
+    def _longest_silence(self, trajectory: Trajectory) -> float:
+        """Longest time for which the thrust is not a level commanded within the last h0, s."""
+        channel, time = self.law.thrusters[0], trajectory.time
+        thrust, command = trajectory[channel], trajectory[f"{channel}_command"]
+        longest = self.theorem.max_delay + (self.law.period or 0.0)
+        agrees = np.isclose(thrust, command, rtol=1e-6)
+        agreed = np.maximum.accumulate(np.where(agrees, time, -np.inf))
+        changed = np.r_[True, np.diff(command) != 0]
+        since = time[np.maximum.accumulate(np.where(changed, np.arange(len(time)), 0))]
+        # The command has stood for longer than the delay, and the thrust is not it.
+        stale = ~agrees & (time - since > longest)
+        waited = time - np.maximum(np.where(np.isfinite(agreed), agreed, time[0]), since)
+        return float(np.max(waited[stale], initial=0.0))
 
     def _feedback_start(self, trajectory: Trajectory) -> float:
         """T2 of a flight, s; its first row if there is no attraction."""

@@ -9,7 +9,8 @@ What the law is fed, (beta^, v^), obeys v^' = u + d2, beta^' = v^ + d1 with noth
 innovation / T in d1, d2; so Theorem 2 holds for it with |f| replaced by d2 + 2 c d1, and |beta| <=
 |beta^| + e with the observer's error e.  Bounds of e, d1 and d2 are sums over the impulse response
 of the error: what disturbs it is f, the thrust error of a delay known to within some time, and
-sensor noise.  (Own extension of Efremov et al. 2006.)
+sensor noise.  The modes are taken to be those of the machine: on others the
+estimate is not bounded, and nothing here says so.  (Own extension of Efremov et al. 2006.)
 """
 
 import math
@@ -161,8 +162,8 @@ def design_observed(
     disturbance: float,
     sensors: Literal["angle", "angle and rate"] = "angle and rate",
     delay_error: float = 0.0,
-    angle_noise: float = 1e-5,
-    rate_noise: float = 1e-5,
+    angle_noise: float = 2e-5,
+    rate_noise: float = 2e-5,
     level: float | None = None,
     threshold: float | None = None,
 ) -> tuple[ObservedRelay, tuple[Guarantee, ...]]:
@@ -194,7 +195,7 @@ def design_observed(
     """
     positive(period=period, disturbance=disturbance, angle_noise=angle_noise, rate_noise=rate_noise)
     positive(delay_error=delay_error, zero=True)
-    relay, _ = design_nonlocal(
+    relay, promises = design_nonlocal(
         model, thrusters, max_delay=max_delay, accuracy=accuracy, radius=radius, c=c, gain=gain,
         level=level, threshold=threshold, period=period,
     )  # fmt: skip
@@ -220,8 +221,9 @@ def design_observed(
         period=period,
         sensors=names,
     )
-    claims = _claims(relay, model, thrusters, errors, max_delay, accuracy, radius, disturbance)
-    return law, claims
+    inherited = promises[0].assumptions  # of the theorem, of thrusters and sampling, of units
+    bounds = max_delay, accuracy, radius, disturbance, delay_error
+    return law, _claims(relay, model, thrusters, errors, inherited, *bounds)
 
 
 def _observer(
@@ -265,23 +267,25 @@ def _claims(
     model: ReducedModel,
     thrusters: Thrusters,
     errors: Errors,
+    inherited: tuple[Assumption, ...],
     max_delay: float,
     accuracy: float,
     radius: float,
     disturbance: float,
+    delay_error: float,
 ) -> tuple[Guarantee, ...]:
     c, E, v1 = relay.c, math.exp(relay.c * max_delay), relay.thresholds[0]
     f = errors.d2 + 2 * c * errors.d1
     S = (relay.lowest + f) / c * (E - 1) / (2 - E)
-    spec = thrusters[CHANNEL]
+    final_angle = (S + errors.d1) / c + errors.angle
     parameters = (
+        *inherited,
         Assumption(
             text="d2 + 2 c d1 < v1 c/2: what the observer costs", value=f, limit=v1 * c / 2,
             unit="rad/s^2",
         ),
         Assumption(
-            text="delay and sampling period < h0", value=spec.delay.longest + (relay.period or 0.0),
-            limit=max_delay, unit="s",
+            text="(S + d1)/c + error < eps", value=final_angle, limit=accuracy, unit="rad"
         ),
     )  # fmt: skip
 
@@ -297,9 +301,10 @@ def _claims(
         max_delay=max_delay,
         accuracy=accuracy,
         settling=partial(settling_time, c=c, accuracy=accuracy),
-        final_angle=(S + errors.d1) / c + errors.angle,
+        final_angle=final_angle,
         final_rate=2 * S + errors.d1 + errors.rate,
         disturbance=disturbance,
         entry=entry,
+        assumed_delay=(thrusters[CHANNEL].delay.mean, delay_error),
     )
     return Claims(theorem=theorem, law=relay, model=model, thrusters=thrusters).all()

@@ -6,8 +6,8 @@ from spacecraft_sim.guarantee import Guarantee, Measurement
 from spacecraft_sim.reduced import ReducedModel
 from spacecraft_sim.trajectory import Trajectory
 
-# Of the largest momentum. RK4 stays below it at any step that resolves the highest mode; a thrust
-# edge that is missed by a millisecond does not.
+# Of the largest momentum, the whole or that of a rigid machine at the rate of the bus. RK4 stays
+# below it at any step that resolves the highest mode; a thrust edge missed by 1 ms does not.
 _SHARE = 1e-6
 
 
@@ -23,6 +23,7 @@ def momentum_balances(model: ReducedModel) -> tuple[Guarantee, ...]:
 
 def _balance(model: ReducedModel, axis: str) -> Guarantee:
     name = f"angular_momentum_{axis}"
+    J = float(model.inertia[-1])
     torque = {channel: model.gain(channel, name) for channel in model.inputs}
 
     def measure(trajectory: Trajectory) -> Measurement:
@@ -30,7 +31,8 @@ def _balance(model: ReducedModel, axis: str) -> Guarantee:
         impulse = sum(k * trajectory[f"{channel}_impulse"] for channel, k in torque.items())
         error = np.abs(H - H[0] - impulse)
         worst = int(np.argmax(error))
-        bound = _SHARE * float(np.max(np.abs(H)))
+        spin = J * float(np.max(np.abs(trajectory.signals.get(f"rate_{axis}", H / J))))
+        bound = _SHARE * max(float(np.max(np.abs(H))), spin)
         return Measurement(float(error[worst]), float(trajectory.time[worst]), bound=bound)
 
     return Guarantee(

@@ -205,7 +205,9 @@ def _grow(spec: mujoco.MjSpec, boom: Boom, spacecraft: Spacecraft) -> None:
     s, w = beam.hinge_rule(boom.rule, boom.n_hinges)
     ends = np.r_[0.0, s, 1.0] * boom.length
     stiffness = boom.bending_stiffness / (w * boom.length)
-    body = root.parent.add_body(name=f"{boom.name}_0", pos=root.pos, quat=root.quat)
+    # Where the site is after all that MJCF allows (euler, axes, frames): ask the compiled bus.
+    site = spec.copy().compile().site(boom.root)
+    body = root.parent.add_body(name=f"{boom.name}_0", pos=site.pos, quat=site.quat)
     _link(body, ends[1], boom)
     for j, name in enumerate(hinge_names(boom)):
         body = body.add_body(name=name, pos=[ends[j + 1] - ends[j], 0, 0])
@@ -215,6 +217,7 @@ def _grow(spec: mujoco.MjSpec, boom: Boom, spacecraft: Spacecraft) -> None:
             axis=[0, 0, 1],
             stiffness=np.r_[stiffness[j], 0, 0],
             damping=np.r_[boom.damping_time * stiffness[j], 0, 0],
+            **_PLAIN_JOINT,
         )
         _link(body, ends[j + 2] - ends[j + 1], boom)
     tip = [ends[-1] - ends[-2], 0, 0]
@@ -236,6 +239,17 @@ def _grow(spec: mujoco.MjSpec, boom: Boom, spacecraft: Spacecraft) -> None:
         reftype=mujoco.mjtObj.mjOBJ_SITE,
         refname=boom.root,
     )
+
+
+# What a <default> of the user's file must not lend to the hinges of a boom.
+_PLAIN_JOINT = {
+    "armature": 0.0,
+    "frictionloss": 0.0,
+    "limited": mujoco.mjtLimited.mjLIMITED_FALSE,
+    "actfrclimited": mujoco.mjtLimited.mjLIMITED_FALSE,
+    "springref": 0.0,
+    "ref": 0.0,
+}
 
 
 def _link(body, length: float, boom: Boom) -> None:
@@ -274,6 +288,11 @@ def _follow_lines(actuator, spacecraft: Spacecraft) -> None:
             f"{spacecraft.xml.name}: actuator {actuator.name!r} drives a thruster and must be a "
             "<motor>: fixed gain, no bias, no dynamics of its own"
         )
+    if actuator.forcelimited == mujoco.mjtLimited.mjLIMITED_TRUE or any(actuator.forcerange):
+        raise ValueError(
+            f"{spacecraft.xml.name}: actuator {actuator.name!r} clips its force to "
+            f"{actuator.forcerange}; a thruster's levels are its limits: remove forcerange"
+        )
     if actuator.ctrllimited == mujoco.mjtLimited.mjLIMITED_TRUE or any(actuator.ctrlrange):
         _refuse_levels_out_of_range(actuator, spacecraft)
     actuator.dyntype = mujoco.mjtDyn.mjDYN_INTEGRATOR
@@ -292,7 +311,7 @@ def _refuse_levels_out_of_range(actuator, spacecraft: Spacecraft) -> None:
 
 
 def _refuse_what_does_not_float(model: mujoco.MjModel, where: Path) -> None:
-    """A spacecraft floats: no gravity, no contacts, no other constraint or medium."""
+    """A spacecraft floats: no gravity, no contacts, no medium."""
     faults = []
     if np.any(model.opt.gravity):
         faults.append(f'gravity is on: {model.opt.gravity}; set <option gravity="0 0 0"/>')

@@ -2,7 +2,6 @@
 
 import json
 import math
-import shutil
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -35,15 +34,6 @@ def create(path: Path | None, name: str) -> Path:
     except OSError as error:
         raise ValueError(f"--out {folder}: cannot be written: {error.strerror}") from error
     return folder
-
-
-def discard(folder: Path) -> None:
-    """Removes the folder of a run that never flew.
-
-    Args:
-        folder: What `create` made.
-    """
-    shutil.rmtree(folder)
 
 
 def write_flights(folder: Path, scenario: Scenario, *flights: Trajectory) -> None:

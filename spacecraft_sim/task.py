@@ -89,6 +89,10 @@ class ControlTask(control.Task):
             physics: The plant.
         """
         extra = np.asarray(action, dtype=float).tolist()
+        if len(extra) != len(self._thrusters.names):
+            raise ValueError(
+                f"the action has {len(extra)} entries; channels: {self._thrusters.names}"
+            )
         if extra != self._extra:
             self._extra = extra
             self._issue(physics.time())
@@ -101,6 +105,14 @@ class ControlTask(control.Task):
         """
         highest = np.array([max(spec.levels) for spec in self._thrusters.specs])
         return specs.BoundedArray(highest.shape, float, -highest, highest, name="extra_command")
+
+    def observation_spec(self, physics: Plant) -> dict[str, specs.Array]:
+        """Returns the specification of the readings: scalars, by name.
+
+        Args:
+            physics: The plant.
+        """
+        return {name: specs.Array((), float, name=name) for name in physics.units}
 
     def get_observation(self, physics: Plant) -> dict[str, np.ndarray]:
         """Returns every reading by name.

@@ -59,7 +59,7 @@ def test_error_stays_within_its_bound():
     ready, track, estimates = flown("initial.boom_amplitude=0.0")
     angle, rate = estimation_errors(track, estimates, after=0.0)
     law = ready.controller
-    noise = np.array([1e-5])
+    noise = np.array([2e-5])
     _, errors = efremov_observer._observer(law.model, law.rows, law.period, 8.6e-7, 0.0, noise)
     assert angle <= errors.angle
     assert rate <= errors.rate
@@ -116,3 +116,12 @@ def test_a_disturbance_too_large_for_the_observer_is_said_to_fail():
 def test_bad_input_is_refused(setting, message):
     with pytest.raises(ValueError, match=message):
         mission.assemble(mission.load_scenario(SCENARIO, (setting,)))
+
+
+def test_a_delay_other_than_the_one_assumed_is_said_to_fail():
+    ready = mission.assemble(
+        mission.load_scenario(SCENARIO, (*SHORT, "actual.thrusters.all.delay=0.16"))
+    )
+    verdict = ready.guarantees[0].check(ready.fly())
+    assert not verdict.holds
+    assert any("as the observer assumes" in a.text for a in verdict.failed)

@@ -32,7 +32,7 @@ CONTROLLERS = {
         "gain": 2.765,
         "period": 0.01,
         "disturbance": 8.6e-7,
-        "angle_noise": 1e-5,
+        "angle_noise": 2e-5,
     },
 }
 # Accelerations that the laws need, rad/s^2: p 3^k with p of Theorems 1 and 2.
