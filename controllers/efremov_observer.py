@@ -20,7 +20,6 @@ from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import scipy.linalg
 
 from controllers.efremov import design_nonlocal, settling_time
 from controllers.efremov_claims import PAPER, Claims, Theorem
@@ -235,6 +234,8 @@ def _observer(
     noise: Array,
 ) -> tuple[Array, Errors]:
     """The stationary Kalman gain, and the bounds that hold with it."""
+    import scipy.linalg  # slow to import, and seldom needed
+
     A, b, C = real_form(system, rows)
     n = len(b)
     F = scipy.linalg.expm(A * T)

@@ -49,10 +49,11 @@ def wave_numbers(n: int) -> Array:
         n: How many.
     """
     # 1/cosh keeps the function bounded; the roots lie pi apart, close to (i - 1/2) pi.
-    centres = (np.arange(1, n + 1) - 0.5) * np.pi
-    return np.array(
-        [_root(lambda z: np.cos(z) + 1 / np.cosh(z), x - 0.5, x + 0.5) for x in centres]
-    )
+    z = (np.arange(1, n + 1) - 0.5) * np.pi
+    for _ in range(8):  # Newton from the inner side: digits double from 0.3 off at worst
+        sech = 1 / np.cosh(z)
+        z += (np.cos(z) + sech) / (np.sin(z) + sech * np.tanh(z))
+    return z
 
 
 def cantilever_frequencies(

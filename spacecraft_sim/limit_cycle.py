@@ -19,7 +19,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from spacecraft_sim.checks import positive
 from spacecraft_sim.modal_form import real_form
@@ -212,6 +211,8 @@ def _is_cycle(system: RelaySystem, start: State, P: float, delay: float) -> bool
 
 def _multiplier(system: RelaySystem, start: State, P: float, delay: float) -> float:
     """Largest |eigenvalue| of the map of deviations from one zero of s to the next."""
+    import scipy.linalg  # slow to import, and seldom needed
+
     (m, theta), row, p = _turns_under_way(P, delay), system.switching, system.levels[0]
     A, b, (c,) = real_form(system, [row])
     x = _state_at(system, start, P - theta)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from dm_control.rl import control
 
 from spacecraft_sim.beam import Galerkin
@@ -127,7 +126,7 @@ def truncate(
         raise ValueError("the bus must move freely: no joint, or a spring or damper on it")
     shapes_rigid = np.eye(len(M))[:, rigid]
     inertia = M[np.ix_(rigid, rigid)]
-    squares, shapes = scipy.linalg.eigh(K, M)
+    squares, shapes = _eigenmodes(K, M)
     elastic = np.arange(len(rigid), len(M))  # eigh sorts; the rigid motion comes first
     participation = np.linalg.norm(shapes[:, elastic].T @ B, axis=1)
     reached = elastic[participation > 1e-9 * max(participation.max(initial=0.0), 1e-300)]
@@ -153,6 +152,14 @@ def truncate(
         neglected=frequencies[neglected],
         inertia=np.diag(inertia),
     )
+
+
+def _eigenmodes(K: Array, M: Array) -> tuple[Array, Array]:
+    """Ascending squares of frequencies and M-orthonormal shapes of K x = omega^2 M x."""
+    L = np.linalg.cholesky(M)
+    A = np.linalg.solve(L, np.linalg.solve(L, K).T)
+    squares, shapes = np.linalg.eigh((A + A.T) / 2)
+    return squares, np.linalg.solve(L.T, shapes)
 
 
 def galerkin_model(
