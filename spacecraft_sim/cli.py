@@ -216,10 +216,11 @@ def _figure(value: float | None, unit: str) -> str:
 
 def _export(arguments: argparse.Namespace) -> int:
     require_supported_mujoco()
-    from spacecraft_sim import library, mjcf, spacecraft
+    from spacecraft_sim import config, library, mjcf, spacecraft
 
     name = arguments.name
-    if name in library.scenario_names():
+    own = name.endswith(".toml") and "spacecraft" in config.read(Path(name))
+    if own or name in library.scenario_names():
         from spacecraft_sim import mission
 
         scenario = mission.load_scenario(name)

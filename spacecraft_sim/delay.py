@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 from pydantic import model_validator
 
@@ -103,13 +104,16 @@ def _solved(delay: Callable[[float], float]) -> Callable[[float], float]:
     from scipy.optimize import brentq
 
     def arrive(t: float) -> float:
-        ahead = max(delay(t), 1e-9)
+        if not (h := delay(t)) >= 0:
+            raise ValueError(f"the delay goes negative, or is no number: h({t} s) = {h} s")
+        ahead = max(h, 1e-9)
         while t + ahead - delay(t + ahead) < t:
             ahead *= 2
             if ahead > 1e9:
                 raise ValueError(f"a command of t = {t} s never takes effect: h grows too fast")
-        if (h := delay(t)) < 0:
-            raise ValueError(f"the delay goes negative: h({t} s) = {h} s")
+        issued = [a - delay(a) for a in (t + k * ahead / 32 for k in range(33))]
+        if any(later <= earlier for earlier, later in pairwise(issued)):
+            raise ValueError(f"the delay runs backwards after t = {t} s: a - h(a) does not grow")
         return brentq(lambda a: a - delay(a) - t, t, t + ahead, xtol=1e-15)  # pyright: ignore
 
     return arrive

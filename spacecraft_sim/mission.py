@@ -122,14 +122,20 @@ def load_scenario(
         if str(name) not in known:
             raise ValueError(choices("scenario", str(name), known, where="the library"))
         path = library.folder("scenarios") / f"{name}.toml"
-    table = config.override({"name": path.stem, **config.read(path)}, settings)
-    machine = table.get("spacecraft")
-    if isinstance(machine, str) and machine.endswith(".toml"):
-        table["spacecraft"] = str((path.parent / machine).resolve())
+    table = _with_machine_found({"name": path.stem, **config.read(path)}, path.parent)
+    table = _with_machine_found(config.override(table, settings), Path())
     faults = config.faults(Scenario, table) + _controller_faults(table.get("controller"), laws)
     if faults:
         raise ValueError("\n".join([f"{path}:", *faults]))
     return config.validate(Scenario, table, where=str(path))
+
+
+def _with_machine_found(table: config.Table, folder: Path) -> config.Table:
+    """A spacecraft given by its file is looked for in the folder of whoever names it."""
+    machine = table.get("spacecraft")
+    if isinstance(machine, str) and machine.endswith(".toml"):
+        return {**table, "spacecraft": str((folder / machine).resolve())}
+    return table
 
 
 def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Mission:
@@ -192,6 +198,11 @@ def reduced_plant(
     wiring = mjcf.channels(machine, [n for n in full.inputs if n.startswith("disturbance_")])
     B = linear.B @ [[a in actuators for actuators in wiring.values()] for a in linear.actuators]
     if scenario.reduced.source == "galerkin":
+        if modes == 0:
+            raise ValueError(
+                "reduced.modes = 0: a Galerkin model has at least one mode; set reduced.modes = 1, "
+                'or reduced.source = "mjcf"'
+            )
         inertia, radius, boom = linearize.planar_bus(model, machine)
         coefficients = beam.galerkin(
             bus_inertia=inertia,

@@ -62,7 +62,7 @@ class Reduced(Model):
 class Scenario(Model):
     """A flight: spacecraft, start, law, thrusters, disturbance, reduced model, seed."""
 
-    name: str = quantity("name")
+    name: str = quantity("name", pattern=r"^\w[\w .-]*$")
     title: str = quantity("one line about it")
     description: str = quantity("what it shows", "", "")
     spacecraft: str = quantity("name of a spacecraft, or path of its TOML file")

@@ -99,7 +99,7 @@ def test_a_delay_no_actuator_has_is_refused(changes, message):
     ("delay", "message"),
     [
         (lambda t: 0.0, r"must be positive; a command of t = 0\.0 s acts at 0\.0 s"),
-        (lambda t: -0.1, r"negative: h\(0\.0 s\) = -0\.1 s"),
+        (lambda t: -0.1, r"negative.*h\(0\.0 s\) = -0\.1 s"),
         (lambda t: 0.1 + 2 * t, r"t = 0\.0 s never takes effect: h grows too fast"),
     ],
 )
@@ -108,9 +108,9 @@ def test_a_callable_delay_is_checked_when_it_is_used(delay, message):
         arrival(delay)(0.0)
 
 
-def test_a_callable_delay_that_runs_backwards_is_found_when_commands_cross():
+def test_a_callable_delay_that_runs_backwards_is_found_at_the_first_command():
     arrive = arrival(lambda t: 0.25 + 0.2 * math.sin(20 * t))  # h' up to 4
-    with pytest.raises(ValueError, match=r"runs backwards.*at \d\.\d+ s before \d\.\d+ s"):
+    with pytest.raises(ValueError, match=r"runs backwards"):
         list(map(arrive, np.linspace(0, 2, 200).tolist()))
 
 
