@@ -1,7 +1,7 @@
 """Disturbance torques on the bus, as known functions of time."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 from spacecraft_sim.config import Model, quantity
@@ -21,10 +21,17 @@ class Torque(Model):
 
     def __call__(self, t: float) -> float:
         """Returns the torque at `t`, N m."""
-        wave = math.sin(self.frequency * t + self.phase)
+        return self.function()(t)
+
+    def function(self) -> Callable[[float], float]:
+        """Returns the torque as a plain function of time, for the inner loop."""
+        constant, amplitude, omega, phase = (
+            self.constant, self.amplitude, self.frequency, self.phase
+        )  # fmt: skip
+        sin, copysign = math.sin, math.copysign
         if self.waveform == "square":
-            wave = math.copysign(1.0, wave)
-        return self.constant + self.amplitude * wave
+            return lambda t: constant + amplitude * copysign(1.0, sin(omega * t + phase))
+        return lambda t: constant + amplitude * sin(omega * t + phase)
 
     def next_edge(self, t: float) -> float:
         """Returns the first time after `t` at which a square wave turns over, s; inf if none.
@@ -51,6 +58,7 @@ class Disturbance:
     def __init__(self, torques: Mapping[Any, Torque]):
         self.names = tuple(f"disturbance_{axis}" for axis in torques)
         self._torques = tuple(torques.values())
+        self._calls = tuple(torque.function() for torque in self._torques)
         self._jumping = tuple(t for t in self._torques if t.waveform == "square")
         smooth = [t for t in self._torques if t.amplitude and t.waveform == "sine"]
         fastest = max((abs(t.frequency) for t in smooth), default=0.0)
@@ -62,7 +70,7 @@ class Disturbance:
         Args:
             t: Time, s.
         """
-        return [torque(t) for torque in self._torques]
+        return [torque(t) for torque in self._calls]
 
     def next_edge(self, t: float) -> float:
         """Returns the first time after `t` at which a torque jumps, s; inf if none.
@@ -70,7 +78,9 @@ class Disturbance:
         Args:
             t: Time, s.
         """
-        return min((torque.next_edge(t) for torque in self._jumping), default=math.inf)
+        if not self._jumping:
+            return math.inf
+        return min(torque.next_edge(t) for torque in self._jumping)
 
     def line(self, t0: float, t1: float) -> tuple[list[float], list[float]]:
         """Returns value at `t0` and rate of the straight line that stands for the torque.
@@ -84,8 +94,9 @@ class Disturbance:
         """
         span = t1 - t0
         value, rate = [], []
-        for torque in self._torques:
-            a, b = torque(t0 + (0.5 - _GAUSS) * span), torque(t0 + (0.5 + _GAUSS) * span)
+        early, late = t0 + (0.5 - _GAUSS) * span, t0 + (0.5 + _GAUSS) * span
+        for torque in self._calls:
+            a, b = torque(early), torque(late)
             slope = (b - a) / (2 * _GAUSS * span)
             value.append((a + b - slope * span) / 2)
             rate.append(slope)

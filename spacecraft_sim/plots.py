@@ -115,9 +115,9 @@ def _film(figure: Figure, grid: GridSpec, drawing: Drawing, measured: Trajectory
         row = int(np.searchsorted(measured.time, drawing.time[frame], side="right")) - 1
         thrust = _arrows(axes, drawing, measured, frame, row)
         axes.set_title(
-            f"t = {drawing.time[frame]:.1f} s", loc="left", size=10, weight="bold", pad=4
+            f"t = {drawing.time[frame]:.1f} s", loc="left", y=1.0, size=10, weight="bold", pad=4
         )
-        axes.set_title(thrust, loc="right", size=9, color=SOFT, pad=4)
+        axes.set_title(thrust, loc="right", y=1.0, size=9, color=SOFT, pad=4)
     # Every frame shows the same window, with equal scales.
     reach = np.max([np.abs(axes.dataLim.get_points()).max(axis=0) for axes in strip], axis=0)
     box = strip[0].get_window_extent()

@@ -248,7 +248,7 @@ class ReducedPhysics(control.Physics):
         self._eigenvalues, self._shapes = np.linalg.eig(A)
         self._left = np.linalg.inv(self._shapes)
         self._drive = self._left[:, k:] @ model.B[n - k :]
-        self._whole_step = self._propagator(timestep)
+        self._span, self._propagated = timestep, self._propagator(timestep)
         # y = y0 + Y_r r + Y_v r' + Re(Y_z z)
         C, rigid = model.C, self._rigid
         elastic = np.hstack([C[:, rigid:n], C[:, n + rigid :]])
@@ -309,9 +309,9 @@ class ReducedPhysics(control.Physics):
         start, r, v, z = self._opened
         a, da, g, dg = self._forces
         h = t - start
-        # Rounding of the clock aside, most pieces are whole steps.
-        whole = abs(h - self._timestep) < 1e-12
-        decay, held, ramp = self._whole_step if whole else self._propagator(h)
+        if abs(h - self._span) > 1e-12:  # rounding of the clock aside, most pieces are alike
+            self._span, self._propagated = h, self._propagator(h)
+        decay, held, ramp = self._propagated
         self._r = r + h * (v + h * (a / 2 + h * da / 6))
         self._v = v + h * (a + h * da / 2)
         self._z = decay * z + held * g + ramp * dg

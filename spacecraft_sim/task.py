@@ -199,7 +199,8 @@ class ControlTask(control.Task):
         return points[-1][0], points[-1][1] <= 0
 
     def _least_event(self, t: float) -> float:
-        return min(self._controller.events(t, self._measure(), self._memory), default=1.0)
+        events = self._controller.events(t, self._measure(), self._memory)
+        return min(events) if events else 1.0
 
     def _decide(self, t: float) -> None:
         """Lets the controller step on the present readings and issues its command."""
