@@ -128,8 +128,8 @@ class ControlTask(control.Task):
         Args:
             physics: The plant.
         """
-        error = sum(x * x for x in self._attitude())
-        return 1 / (1 + error / self._accuracy**2)
+        angle = math.hypot(*self._attitude()) / self._accuracy
+        return 1 / (1 + angle * angle)
 
     # -- the flight ------------------------------------------------------------------------------
 

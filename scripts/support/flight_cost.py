@@ -45,7 +45,8 @@ def controlled_step(*, span: float, rounds: int) -> None:
         span: Simulated time of a round, s.
         rounds: Interleaved rounds.
     """
-    flagship = mission.assemble(mission.load_scenario(FLAGSHIP))
+    settings = ("simulation.timestep=0.01", "simulation.substeps=10")
+    flagship = mission.assemble(mission.load_scenario(FLAGSHIP, settings))
     environment, model = flagship.environment(), flagship.mujoco.model.ptr
     action = np.zeros(environment.action_spec().shape)
     data, steps = mujoco.MjData(model), round(span / model.opt.timestep)
