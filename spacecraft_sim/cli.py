@@ -5,6 +5,7 @@ Heavy modules are imported by the commands that need them.
 """
 
 import argparse
+import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from spacecraft_sim.trajectory import Trajectory
 
 HOLDS, FAILS, BAD_INPUT, BROKEN = 0, 1, 2, 3
+
+# The matrices are small: threads of the linear algebra would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
