@@ -125,6 +125,7 @@ def load_scenario(
     table = _with_machine_found({"name": path.stem, **config.read(path)}, path.parent)
     table = _with_machine_found(config.override(table, settings), Path())
     faults = config.faults(Scenario, table) + _controller_faults(table.get("controller"), laws)
+    faults += _part_faults(table)
     if faults:
         raise ValueError("\n".join([f"{path}:", *faults]))
     return config.validate(Scenario, table, where=str(path))
@@ -238,6 +239,24 @@ def parameters_of(law: Design) -> dict[str, inspect.Parameter]:
     """
     found = inspect.signature(law, eval_str=True).parameters
     return {name: p for name, p in found.items() if p.kind is inspect.Parameter.KEYWORD_ONLY}
+
+
+def _part_faults(table: config.Table) -> list[str]:
+    """Names of booms and thrusters that the spacecraft does not have."""
+    try:
+        machine = spacecraft.load(table.get("spacecraft", ""))
+    except ValueError:
+        return []  # said when the machine is loaded
+    found, actual = [], table.get("actual")
+    for prefix, owner in (("", table), ("actual.", actual if isinstance(actual, dict) else {})):
+        for kind, parts in (("booms", machine.booms), ("thrusters", machine.thrusters)):
+            known = [*(part.name for part in parts), "all"]
+            changes = owner.get(kind)
+            for name in changes if isinstance(changes, dict) else ():
+                if name not in known:
+                    text = choices(kind[:-1], name, known, where=machine.name)
+                    found.append(f"  {prefix}{kind}.{name}: {text}")
+    return found
 
 
 def _controller_faults(table: Any, laws: Mapping[str, Design]) -> list[str]:

@@ -116,6 +116,7 @@ def compile(
     except ValueError as error:
         raise ValueError(f"{spacecraft.xml}: {error}") from error
     _refuse_what_does_not_float(model, spacecraft.xml)
+    _refuse_other_masses(model, spacecraft)
     return model
 
 
@@ -307,6 +308,18 @@ def _refuse_levels_out_of_range(actuator, spacecraft: Spacecraft) -> None:
             raise ValueError(
                 f"thruster {thruster.name!r} has the level {top}, outside the ctrlrange "
                 f"[{lowest}, {highest}] of actuator {actuator.name!r}"
+            )
+
+
+def _refuse_other_masses(model: mujoco.MjModel, spacecraft: Spacecraft) -> None:
+    """A compiler setting of the bus, such as settotalmass, must not rescale the booms on it."""
+    for boom in spacecraft.booms:
+        wanted = boom.linear_density * boom.length + boom.tip_mass
+        grown = float(model.body_subtreemass[model.body(f"{boom.name}_0").id])
+        if abs(grown - wanted) > 1e-9 * wanted:
+            raise ValueError(
+                f"{spacecraft.xml}: boom {boom.name!r} weighs {grown} kg once compiled, not "
+                f"{wanted} kg; remove settotalmass, boundmass or inertiafromgeom from <compiler>"
             )
 
 

@@ -54,3 +54,10 @@ def test_a_thruster_that_clips_its_force_is_refused(tmp_path):
     clipped = machine(tmp_path, ("<motor ", '<motor forcerange="-1 1" '))
     with pytest.raises(ValueError, match=r"thruster_z.*forcerange"):
         mjcf.compile(clipped, timestep=0.01)
+
+
+@pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass'")  # MuJoCo's own word on it
+def test_a_compiler_setting_that_rescales_the_booms_is_refused(tmp_path):
+    scaled = machine(tmp_path, ("<worldbody>", '<compiler settotalmass="50"/><worldbody>'))
+    with pytest.raises(ValueError, match=r"boom 'left' weighs .* settotalmass"):
+        mjcf.compile(scaled, timestep=0.01)
