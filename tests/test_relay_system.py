@@ -357,7 +357,7 @@ def test_work_grows_in_proportion_to_the_switchings(modes, monkeypatch):
         ({"delay": -0.2}, r"delay = -0\.2"),
         ({"delay": 0.0}, r"delay = 0\.0"),
         ({"delay": math.nan}, "delay = nan"),
-        ({"delay": lambda t: 0.1 - t}, r"negative: h\(0\.1\d* s\) = -\d"),
+        ({"delay": lambda t: 0.1 - t}, r"negative.*h\(0\.1\d* s\) = -\d"),
         ({"delay": lambda t: 0.1 + 2 * max(t - 1, 0)}, "grows too fast"),
         ({"duration": 0.0}, r"> 0: duration = 0\.0"),
         ({"duration": -1.0}, r"> 0: duration = -1\.0"),
