@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from scipy.special import roots_jacobi, roots_legendre
+from numpy.polynomial.legendre import leggauss
 
 from spacecraft_sim.checks import positive
 
@@ -274,10 +274,32 @@ def hinge_rule(rule: Rule, n: int) -> tuple[Array, Array]:
 
 
 def _gauss_legendre(n: int) -> tuple[Array, Array]:
-    x, w = roots_legendre(n)
+    x, w = leggauss(n)
     return (1 + x) / 2, w / 2
 
 
 def _gauss_jacobi(n: int) -> tuple[Array, Array]:
-    x, w = roots_jacobi(n, 4, 0)
-    return (1 + x) / 2, w / (1 - x) ** 4 / 2
+    """The weight is (1 - s/l)^4: nodes are the zeros of the Jacobi polynomial P_n^(4,0).
+
+    Written out, because scipy.special takes longer to import than a short flight to fly.
+    """
+    # Golub & Welsch (1969); their eigenvectors would lose digits of the weights near the tip.
+    k = np.arange(n)
+    below = k[1:] * (k[1:] + 4) / ((k[1:] + 2) * np.sqrt((2 * k[1:] + 3) * (2 * k[1:] + 5)))
+    x = np.linalg.eigvalsh(np.diag(-4 / ((k + 2) * (k + 3))) + np.diag(below, -1))
+    for _ in range(2):  # Newton, from a few units in the last place
+        value, slope = _jacobi(n, x)
+        x = x - value / slope
+    slope = _jacobi(n, x)[1]
+    return (1 + x) / 2, 16 / ((1 - x * x) * slope**2 * (1 - x) ** 4)
+
+
+def _jacobi(n: int, x: Array) -> tuple[Array, Array]:
+    """P_n^(4,0) and its derivative by the recurrence in n (DLMF 18.9.2 and 18.9.17)."""
+    before, value = np.zeros_like(x), np.ones_like(x)
+    for k in range(1, n + 1):
+        ahead = (2 * k + 3) * ((k + 2) * (k + 1) * x + 4) * value
+        ahead -= (k + 3) * (k - 1) * (k + 2) * before
+        before, value = value, ahead / (k * (k + 1) * (k + 4))
+    slope = n * ((2 - (n + 2) * x) * value + (n + 4) * before) / ((n + 2) * (1 - x * x))
+    return value, slope

@@ -9,7 +9,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import FancyArrowPatch, Polygon, Rectangle
-from scipy.spatial import ConvexHull
 
 from spacecraft_sim.drawing import Drawing, Shape, boom_points, channel_units, turned
 from spacecraft_sim.guarantee import Verdict
@@ -158,10 +157,16 @@ def _craft(axes: Axes, drawing: Drawing, frame: int, factor: float) -> None:
             continue
         place, turn = drawing.positions[shape.body][frame], drawing.quaternions[shape.body][frame]
         points = place + turned(turn, shape.position + turned(shape.quaternion, _surface(shape)))
-        # Joggled: a plate seen edge on has no area.
-        hull = (points - centre)[ConvexHull(points[:, :2], qhull_options="QJ").vertices, :2]
+        hull = (points - centre)[_outline(points), :2]
         style = {"facecolor": shape.rgba[:3], "edgecolor": INK, "linewidth": 0.7}
         axes.add_patch(Polygon(hull, zorder=3 + points[:, 2].max(), **style))
+
+
+def _outline(points: Array) -> Array:
+    """Indices of the points furthest out in x, y when looked for all the way round, every 2 deg."""
+    angle = np.linspace(0, 2 * np.pi, 180, endpoint=False)
+    furthest = np.argmax(points[:, :2] @ np.stack([np.cos(angle), np.sin(angle)]), axis=0)
+    return furthest[np.r_[True, np.diff(furthest) != 0]]
 
 
 def _surface(shape: Shape) -> Array:

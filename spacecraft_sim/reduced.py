@@ -6,6 +6,7 @@ in both.  The inputs are linear in time over a piece, for which the solution is 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from dm_control.rl import control
@@ -227,6 +228,9 @@ def _planar_outputs(booms: list[str]) -> dict[str, str]:
     return outputs | {f"{boom}_tip_{axis}": "m" for boom in booms for axis in "xyz"}
 
 
+_DIGITS = 12  # decimals of a second to which the length of a piece is rounded
+
+
 class ReducedPhysics(control.Physics):
     """A reduced model behind the interface that the MuJoCo plant has.
 
@@ -241,17 +245,28 @@ class ReducedPhysics(control.Physics):
         self._start = start
         self.inputs, self.units = model.inputs, model.outputs
         self._timestep = timestep
-        n, k = len(model.B), len(model.frequencies)
-        self._n, self._rigid = n, n - k
-        # Complex modes of the elastic part: (eta, eta') = 2 Re(shapes z), one z of each pair.
+        n, k, m = len(model.B), len(model.frequencies), len(model.inputs)
+        rigid = n - k
+        # The state here is x = (r, r', eta, eta'), its two parts together.
+        self._order = np.r_[:rigid, n : n + rigid, rigid:n, n + rigid : 2 * n]
+        self._rows = model.C[:, self._order]
+        # x(h) = P (x, u, u'), u' being the rate of u; for the rigid part P is cubic in h.
+        B, width = model.B[:rigid], 2 * n + 2 * m
+        powers = np.zeros((4, 2 * rigid, width))
+        powers[0, :, : 2 * rigid] = np.eye(2 * rigid)
+        powers[1, :rigid, rigid : 2 * rigid] = np.eye(rigid)
+        powers[1, rigid:, 2 * n : 2 * n + m] = B
+        powers[2, :rigid, 2 * n : 2 * n + m] = powers[2, rigid:, 2 * n + m :] = B / 2
+        powers[3, :rigid, 2 * n + m :] = B / 6
+        self._powers = powers
+        # The elastic part is diagonal in its complex modes.
         A = np.block([[np.zeros((k, k)), np.eye(k)], [-np.diag(model.frequencies**2), -model.D]])
         self._eigenvalues, self._shapes = np.linalg.eig(A)
-        self._left = np.linalg.inv(self._shapes)
-        self._drive = self._left[:, k:] @ model.B[n - k :]
-        # y = y0 + Y_r r + Y_v r' + Re(Y_z z)
-        C, rigid = model.C, self._rigid
-        elastic = np.hstack([C[:, rigid:n], C[:, n + rigid :]])
-        self._rows = C[:, :rigid], C[:, n : n + rigid], elastic @ self._shapes
+        left = np.linalg.inv(self._shapes)
+        drive = left[:, k:] @ model.B[rigid:]
+        self._left = np.hstack([np.zeros((2 * k, 2 * rigid)), left, drive, drive])
+        self._kind = np.repeat([0, 1, 2], [2 * n, m, m])  # which function of h a column takes
+        self._propagator = lru_cache(maxsize=32)(self._compute_propagator)
         self.reset()
 
     def set_initial(self, initial: Initial) -> None:
@@ -260,11 +275,8 @@ class ReducedPhysics(control.Physics):
         Args:
             initial: The initial state.
         """
-        position, velocity = self._start(initial)
-        q, v = self.model.projection @ position, self.model.projection @ velocity
-        rigid = self._rigid
-        self._r, self._v = q[:rigid], v[:rigid]
-        self._z = self._left @ np.r_[q[rigid:], v[rigid:]].astype(complex)
+        motion = [self.model.projection @ part for part in self._start(initial)]
+        self._x = np.concatenate(motion)[self._order]
 
     def select(self, names: tuple[str, ...]) -> Callable[[], list[float]]:
         """Returns a function that reads the named readings.
@@ -280,12 +292,8 @@ class ReducedPhysics(control.Physics):
             if name not in order:
                 raise ValueError(choices("sensor", name, order, where="the reduced model"))
         rows = [order.index(name) for name in names]
-        y0, (Yr, Yv, Yz) = self.model.y0[rows], (block[rows] for block in self._rows)
-
-        def read() -> list[float]:
-            return (y0 + Yr @ self._r + Yv @ self._v + (Yz @ self._z).real).tolist()
-
-        return read
+        y0, C = self.model.y0[rows], self._rows[rows]
+        return lambda: (y0 + C.dot(self._x)).tolist()
 
     def begin(self, value: Sequence[float], slope: Sequence[float]) -> None:
         """Opens a smooth piece at the present instant.
@@ -294,10 +302,8 @@ class ReducedPhysics(control.Physics):
             value: Inputs at the opening, in the order of `inputs`, N or N m.
             slope: Their rates during the piece, per s.
         """
-        self._opened = self._time, self._r, self._v, self._z
-        u, du = np.asarray(value), np.asarray(slope)
-        B = self.model.B[: self._rigid]
-        self._forces = B @ u, B @ du, self._drive @ u, self._drive @ du
+        self._opening = self._time
+        self._opened = np.concatenate([self._x, value, slope])
 
     def advance(self, t: float) -> None:
         """Carries the plant from the opening of the piece to `t`, exactly.
@@ -305,22 +311,19 @@ class ReducedPhysics(control.Physics):
         Args:
             t: End time, s.
         """
-        start, r, v, z = self._opened
-        a, da, g, dg = self._forces
-        h = t - start
-        if abs(h - self._span) > 2e-13:  # rounding of the clock aside, most pieces are alike
-            self._span, self._propagated = h, self._propagator(h)
-        decay, held, ramp = self._propagated
-        self._r = r + h * (v + h * (a / 2 + h * da / 6))
-        self._v = v + h * (a + h * da / 2)
-        self._z = decay * z + held * g + ramp * dg
+        # But for the rounding of the clock many pieces are alike.
+        span = round(t - self._opening, _DIGITS)
+        self._x = self._propagator(span).dot(self._opened)
         self._time = t
 
-    def _propagator(self, h: float) -> tuple[Array, Array, Array]:
-        """e^w, h (e^w - 1)/w and h^2 (e^w - 1 - w)/w^2 with w = lambda h."""
+    def _compute_propagator(self, h: float) -> Array:
+        """P(h), shape (2 n, 2 n + 2 nu)."""
+        P0, P1, P2, P3 = self._powers
         w = self._eigenvalues * h
         m = np.expm1(w)
-        return m + 1, m / self._eigenvalues, (m - w) / self._eigenvalues**2
+        functions = np.array([m + 1, m / self._eigenvalues, (m - w) / self._eigenvalues**2])
+        elastic = self._shapes @ (functions.T[:, self._kind] * self._left)
+        return np.concatenate([P0 + h * (P1 + h * (P2 + h * P3)), elastic.real])
 
     def coordinates(self) -> list[float]:
         """Returns nothing: the readings say all that the reduced model knows."""
@@ -336,7 +339,7 @@ class ReducedPhysics(control.Physics):
         Raises:
             PhysicsError: Saying when it was found not to be.
         """
-        if not np.all(np.isfinite(np.r_[self._r, self._v, self._z])):
+        if not np.all(np.isfinite(self._x)):
             raise control.PhysicsError(f"the reduced plant diverged before t = {self._time:.6g} s")
 
     def step(self, n_sub_steps: int = 1) -> None:
@@ -361,8 +364,6 @@ class ReducedPhysics(control.Physics):
     def reset(self) -> None:
         """Returns to rest in the reference configuration at time 0, inputs zero."""
         self._time = 0.0
-        # Flights must not depend on the ones before, not even in the last bit.
-        self._span, self._propagated = self._timestep, self._propagator(self._timestep)
         self._held = [0.0] * len(self.inputs)
         self.set_initial(Initial())
 

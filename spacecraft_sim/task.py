@@ -218,8 +218,7 @@ class ControlTask(control.Task):
 
     def _follow_thrust(self, t: float) -> None:
         """Takes thrust and slope just after `t`, and the next edge, from the thrusters."""
-        self._thrust, self._slope = self._thrusters.output(t, self._state)
-        self._edge = self._thrusters.next_edge(t, self._state)
+        self._thrust, self._slope, self._edge = self._thrusters.line(t, self._state)
 
     # -- the record ------------------------------------------------------------------------------
 
@@ -283,7 +282,7 @@ def _foreseen(points: Sequence[Point]) -> float:
         ahead = _on_cubic(ahead, points)
     if ahead < 0.05 * (t - before[0]):
         return t + ahead + WIDTH / 2
-    return t + (1 - 1e-4) * ahead
+    return t + (1 - 3e-5) * ahead
 
 
 def _on_cubic(ahead: float, points: Sequence[Point]) -> float:

@@ -78,25 +78,29 @@ class Thrusters:
             for level, channel, spec in zip(levels, state, self.specs, strict=True)
         )
 
-    def output(self, t: float, state: State) -> tuple[list[float], list[float]]:
-        """Returns thrust and its rate just after `t`, each by channel, N or N m, and per s.
+    def line(self, t: float, state: State) -> tuple[list[float], list[float], float]:
+        """Returns the straight lines that the thrusts follow just after `t`.
 
         Args:
             t: Time, s.
             state: State of the thrusters.
-        """
-        knots = [_knot_at(t, channel.knots) for channel in state]
-        thrust = [k.thrust + k.slope * (t - k.time) if k.slope else k.thrust for k in knots]
-        return thrust, [k.slope for k in knots]
 
-    def next_edge(self, t: float, state: State) -> float:
-        """Returns the first time after `t` at which a thrust has a corner, s; inf if none.
-
-        Args:
-            t: Time, s.
-            state: State of the thrusters.
+        Returns:
+            Thrust by channel, N or N m; its rate, per s; and the time at which a thrust has its
+            next corner, s, inf if none.
         """
-        return min((k.time for c in state for k in c.knots if k.time > t), default=math.inf)
+        thrust, slope, edge = [], [], math.inf
+        for channel in state:
+            present = channel.knots[0]
+            for knot in channel.knots:
+                if knot.time > t:
+                    edge = min(edge, knot.time)
+                    break
+                present = knot
+            start, level, rate = present
+            thrust.append(level + rate * (t - start) if rate else level)
+            slope.append(rate)
+        return thrust, slope, edge
 
 
 def nearest_level(level: float, spec: Thruster) -> float:
@@ -172,11 +176,3 @@ def _ramps(thrust: float, level: float, spec: Thruster) -> list[tuple[float, flo
     if thrust * level < 0:
         return [(0.0, spec.fall_time), (level, spec.rise_time)]
     return [(level, spec.rise_time if abs(level) > abs(thrust) else spec.fall_time)]
-
-
-def _knot_at(t: float, knots: tuple[Knot, ...]) -> Knot:
-    """The last knot at or before `t`."""
-    for knot in reversed(knots):
-        if knot.time <= t:
-            return knot
-    return knots[0]

@@ -187,9 +187,8 @@ def test_undamped_free_flight_keeps_momentum_and_energy():
 
 def state(physics, g):
     """Coordinates and velocities (gamma, q) back from the modal state, through its projection."""
-    n, rigid = len(physics.model.B), 1
-    elastic = (physics._shapes @ physics._z).real
-    modal = np.r_[physics._r, elastic[: n - rigid]], np.r_[physics._v, elastic[n - rigid :]]
+    (r, v), (eta, eta_rate) = physics._x[:2], np.split(physics._x[2:], 2)
+    modal = np.r_[r, eta], np.r_[v, eta_rate]
     return [np.linalg.solve(physics.model.projection, part) for part in modal]
 
 

@@ -28,8 +28,7 @@ def flown(spec, commands, end=60.0):
     state, pieces, t = thrusters.init(), [], 0.0
     for issue, level in [*commands, (end, None)]:
         while t < issue:
-            (thrust,), (slope,) = thrusters.output(t, state)
-            edge = thrusters.next_edge(t, state)
+            (thrust,), (slope,), edge = thrusters.line(t, state)
             assert edge > t
             stop = min(edge, issue)
             pieces.append((t, stop, thrust, slope))
@@ -123,10 +122,10 @@ def test_delay_is_a_shift():
 def test_thrust_just_after_an_edge_is_the_new_one():
     thrusters = Thrusters([relay(delay=0.5)])
     state = thrusters.command(0.0, [2.5], thrusters.init())
-    assert thrusters.output(math.nextafter(0.5, 0), state)[0] == [0.0]
-    assert thrusters.output(0.5, state)[0] == [2.5]
-    assert thrusters.next_edge(0.0, state) == 0.5
-    assert thrusters.next_edge(0.5, state) == math.inf
+    assert thrusters.line(math.nextafter(0.5, 0), state)[0] == [0.0]
+    assert thrusters.line(0.5, state)[0] == [2.5]
+    assert thrusters.line(0.0, state)[2] == 0.5
+    assert thrusters.line(0.5, state)[2] == math.inf
 
 
 def test_minimum_on_time_postpones_the_end_of_a_pulse_and_the_last_word_counts():
@@ -192,15 +191,15 @@ def test_second_command_at_the_same_instant_replaces_the_first(delay, on):
     thrusters = Thrusters([relay(delay=delay, min_on_time=on)])
     state = thrusters.command(1.0, [1.0], thrusters.init())
     state = thrusters.command(1.0, [-2.5], state)
-    assert thrusters.output(1.0 + delay, state)[0] == [-2.5]
+    assert thrusters.line(1.0 + delay, state)[0] == [-2.5]
 
 
 def test_channels_do_not_disturb_each_other():
     thrusters = Thrusters([relay(delay=0.5), relay(name="other", delay=0.25)])
     state = thrusters.command(0.0, [1.0, -7.0], thrusters.init())
-    assert thrusters.next_edge(0.0, state) == 0.25
-    assert thrusters.output(0.25, state)[0] == [0.0, -7.0]
-    assert thrusters.output(0.5, state)[0] == [1.0, -7.0]
+    assert thrusters.line(0.0, state)[2] == 0.25
+    assert thrusters.line(0.25, state)[0] == [0.0, -7.0]
+    assert thrusters.line(0.5, state)[0] == [1.0, -7.0]
 
 
 def test_commanding_leaves_the_earlier_state_as_it_was():
@@ -208,7 +207,7 @@ def test_commanding_leaves_the_earlier_state_as_it_was():
     before = thrusters.init()
     thrusters.command(0.0, [1.0], before)
     assert before == thrusters.init()
-    assert thrusters.output(0.0, before)[0] == [0.0]
+    assert thrusters.line(0.0, before)[0] == [0.0]
 
 
 def test_unknown_thruster_is_refused_with_the_nearest():
@@ -249,13 +248,12 @@ def test_output_inside_a_piece_lies_on_its_line(spec, sequence, share):
         state = thrusters.command(issue, [level], state)
     t = sequence[-1][0]
     for _ in range(60):
-        (thrust,), (slope,) = thrusters.output(t, state)
-        edge = thrusters.next_edge(t, state)
+        (thrust,), (slope,), edge = thrusters.line(t, state)
         if edge == math.inf:
             break
         inside = t + share * (edge - t)
         if t < inside < edge:
-            (found,), (same,) = thrusters.output(inside, state)
+            (found,), (same,), _ = thrusters.line(inside, state)
             assert same == slope
             assert found == pytest.approx(thrust + slope * (inside - t), abs=ROUNDING)
         t = edge
