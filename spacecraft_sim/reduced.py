@@ -228,9 +228,6 @@ def _planar_outputs(booms: list[str]) -> dict[str, str]:
     return outputs | {f"{boom}_tip_{axis}": "m" for boom in booms for axis in "xyz"}
 
 
-_DIGITS = 12  # decimals of a second to which the length of a piece is rounded
-
-
 class ReducedPhysics(control.Physics):
     """A reduced model behind the interface that the MuJoCo plant has.
 
@@ -311,8 +308,10 @@ class ReducedPhysics(control.Physics):
         Args:
             t: End time, s.
         """
-        # But for the rounding of the clock many pieces are alike.
-        span = round(t - self._opening, _DIGITS)
+        span = t - self._opening
+        # But for the rounding of the clock many pieces are alike: those of whole nanoseconds.
+        whole = round(span, 9)
+        span = whole if abs(span - whole) < 2e-13 else span
         self._x = self._propagator(span).dot(self._opened)
         self._time = t
 
