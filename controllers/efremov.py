@@ -87,10 +87,11 @@ def design_local(
     E, p = math.exp(c * max_delay), 1.5 * c**2 * accuracy
     parameters = (Assumption(text="c h0 < ln(6/5)", value=c * max_delay, limit=math.log(6 / 5)),)
     law = _law(model, c, (), p, attraction_level, compensated_delay, period)
-    # The pulses are still under way when feedback begins (erratum 17).
+    # The pulses are still under way when feedback begins (erratum 17).  A level meant to be p is p.
+    pulses = p if math.isclose(law.attraction, p, rel_tol=1e-9) else law.attraction
     pending = Assumption(
         text="pending commands |u| <= p",
-        value=law.attraction,
+        value=pulses,
         limit=p,
         relation="<=",
         unit="rad/s^2",

@@ -1,7 +1,11 @@
-"""Disturbance torques on the bus, as known functions of time."""
+"""Disturbance torques on the bus: functions of time, and torques that follow the motion.
+
+A torque that follows the rate of its axis is the worst that can happen to a regulator; Ivanova &
+Sokolov (1999), (3.2), (3.3), (3.6), (3.7), prove it of these four.
+"""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 from spacecraft_sim.config import Model, quantity
@@ -10,27 +14,40 @@ _GAUSS = math.sqrt(3) / 6  # the Gauss nodes of [0, 1] are 1/2 -+ this
 _RESOLVED = 0.25  # rad of phase a line may span: its mean is then exact to 0.25^4/4320 = 1e-6
 
 
+# Sign of the torque over the sign of the rate: while the axis' thruster is off, and while it is on.
+_FOLLOWS = {
+    "with_rate": (1.0, 1.0),  # (3.2)
+    "against_rate": (-1.0, -1.0),  # (3.3)
+    "with_rate_when_off": (1.0, -1.0),  # (3.6)
+    "against_rate_when_off": (-1.0, 1.0),  # (3.7)
+}
+
+
 class Torque(Model):
-    """A torque about one bus axis: constant + amplitude w(frequency t + phase)."""
+    """A torque about one bus axis: constant + amplitude w, w(frequency t + phase) or a sign."""
 
     constant: float = quantity("constant part", "N m", 0.0)
     amplitude: float = quantity("amplitude of the periodic part", "N m", 0.0)
     frequency: float = quantity("angular frequency of the periodic part", "rad/s", 0.0)
     phase: float = quantity("phase of the periodic part", "rad", 0.0)
-    waveform: Literal["sine", "square"] = quantity("w, a sine or its sign", "", "sine")
+    waveform: Literal[
+        "sine", "square", "with_rate", "against_rate", "with_rate_when_off", "against_rate_when_off"
+    ] = quantity("w, a sine, its sign, or plus or minus the sign of the axis' rate", "", "sine")
 
     def __call__(self, t: float) -> float:
-        """Returns the torque at `t`, N m."""
+        """Returns the torque at `t`, N m, less the part that follows the motion."""
         return self.function()(t)
 
     def function(self) -> Callable[[float], float]:
-        """Returns the torque as a plain function of time, for the inner loop."""
+        """Returns what `__call__` does as a plain function, for the inner loop."""
         constant, amplitude, omega, phase = (
             self.constant, self.amplitude, self.frequency, self.phase
         )  # fmt: skip
         sin, copysign = math.sin, math.copysign
         if self.waveform == "square":
             return lambda t: constant + amplitude * copysign(1.0, sin(omega * t + phase))
+        if self.waveform in _FOLLOWS:
+            return lambda t: constant
         return lambda t: constant + amplitude * sin(omega * t + phase)
 
     def next_edge(self, t: float) -> float:
@@ -39,7 +56,7 @@ class Torque(Model):
         Args:
             t: Time, s.
         """
-        if self.waveform == "sine" or self.frequency == 0:
+        if self.waveform != "square" or self.frequency == 0:
             return math.inf
         half = math.pi / abs(self.frequency)
         first = -self.phase / self.frequency
@@ -47,11 +64,15 @@ class Torque(Model):
         return first + turns * half
 
 
+Ways = tuple[float, ...]  # the sign of the rate of each axis whose torque follows it
+
+
 class Disturbance:
     """The disturbance torques of a scenario, by axis.
 
     Attributes:
         names: Input names `disturbance_<axis>`, in order.
+        sensors: Rate readings that the torques follow.
         longest: Longest interval over which a line stands for the torques, s.
     """
 
@@ -60,12 +81,54 @@ class Disturbance:
         self._torques = tuple(torques.values())
         self._calls = tuple(torque.function() for torque in self._torques)
         self._jumping = tuple(t for t in self._torques if t.waveform == "square")
+        following = [axis for axis, torque in torques.items() if torque.waveform in _FOLLOWS]
+        self.sensors = tuple(f"rate_{axis}" for axis in following)
+        self._following = tuple(
+            (list(torques).index(axis), f"_{axis}", torques[axis].amplitude, *_FOLLOWS[waveform])
+            for axis in following
+            if (waveform := torques[axis].waveform)
+        )
         smooth = [t for t in self._torques if t.amplitude and t.waveform == "sine"]
         fastest = max((abs(t.frequency) for t in smooth), default=0.0)
         self.longest = _RESOLVED / fastest if fastest else math.inf
 
+    def init(self) -> Ways:
+        """Returns the signs of the rates before they were read."""
+        return (1.0,) * len(self.sensors)
+
+    def events(self, rates: Sequence[float], ways: Ways) -> list[float]:
+        """Returns functions that are positive while each rate keeps its sign.
+
+        Args:
+            rates: Readings, in the order of `sensors`, rad/s.
+            ways: The signs.
+        """
+        return [way * rate for way, rate in zip(ways, rates, strict=True)]
+
+    def turned(self, rates: Sequence[float], ways: Ways) -> Ways:
+        """Returns the signs with those turned over whose rate has lost them.
+
+        Args:
+            rates: Readings, in the order of `sensors`, rad/s.
+            ways: The signs until now.
+        """
+        return tuple(way if way * rate > 0 else -way for way, rate in zip(ways, rates, strict=True))
+
+    def push(self, ways: Ways, thrust: Mapping[str, float]) -> list[float]:
+        """Returns the part of the torques that follows the motion, N m.
+
+        Args:
+            ways: The signs of the rates.
+            thrust: Present thrust by channel; one whose name ends in `_<axis>` acts on that axis.
+        """
+        push = [0.0] * len(self.names)
+        for way, (k, axis, amplitude, off, on) in zip(ways, self._following, strict=True):
+            firing = any(level for name, level in thrust.items() if name.endswith(axis))
+            push[k] = amplitude * way * (on if firing else off)
+        return push
+
     def value(self, t: float) -> list[float]:
-        """Returns the torques at `t`, N m.
+        """Returns the part of the torques that is a function of time, at `t`, N m.
 
         Args:
             t: Time, s.
@@ -83,7 +146,7 @@ class Disturbance:
         return min(torque.next_edge(t) for torque in self._jumping)
 
     def line(self, t0: float, t1: float) -> tuple[list[float], list[float]]:
-        """Returns value at `t0` and rate of the straight line that stands for the torque.
+        """Returns value at `t0` and rate of the line that stands for the torques of time.
 
         The line passes through the torque at the two Gauss nodes and so has the same mean and first
         moment up to (t1 - t0)^5: an integrator of order 4 keeps its order.

@@ -1,13 +1,14 @@
 """The task of a flight: measure -> controller -> thrusters -> plant, on either plant."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from dm_control.rl import control
 from dm_env import specs
 
+from spacecraft_sim import crossing
 from spacecraft_sim.controller import Controller
 from spacecraft_sim.disturbance import Disturbance
 from spacecraft_sim.plant import Plant
@@ -40,11 +41,12 @@ class ControlTask(control.Task):
         seed: int = 0,
     ):
         for name in controller.thrusters:
-            thrusters[name]  # raises if there is no such channel
-            if controller.period is None and thrusters[name].delay.mean == 0:
+            spec = thrusters[name]  # raises if there is no such channel
+            if controller.period is None and spec.delay.mean == 0 and spec.min_on_time == 0:
                 raise ValueError(
-                    f"thruster {name!r} has no delay and the law no sampling period: a relay in "
-                    "continuous time would chatter; set thrusters.*.delay or controller.period"
+                    f"thruster {name!r} has neither delay nor minimum on-time and the law no "
+                    "sampling period: a relay in continuous time would chatter; set "
+                    "thrusters.*.delay, thrusters.*.min_on_time or controller.period"
                 )
         self.recorder: Recorder | None = None
         self._controller, self._thrusters = controller, thrusters
@@ -52,6 +54,8 @@ class ControlTask(control.Task):
         self._accuracy = accuracy
         self._random = np.random.default_rng(seed)
         self._channels = [thrusters.names.index(name) for name in controller.thrusters]
+        # Whether instants at which something switches are to be found inside a step.
+        self._located = controller.period is None or bool(disturbance.sensors)
 
     # -- what dm_control asks for ---------------------------------------------------------------
 
@@ -70,14 +74,15 @@ class ControlTask(control.Task):
         self._attitude = physics.select(
             tuple(name for name in physics.units if name.startswith("attitude_"))
         )
-        self._memory = self._controller.init()
+        self._rates = physics.select(self._disturbance.sensors)
+        self._memory, self._ways = self._controller.init(), self._disturbance.init()
         self._state = self._thrusters.init()
         self._extra = [0.0] * len(self._thrusters.names)
         self._command = [0.0] * len(self._thrusters.names)
         self._impulse = [0.0] * len(wanted)
         self._spent = [0.0] * len(self._thrusters.names)
-        self._samples = 0
-        self._unknown_slope = self._controller.period is None
+        self._samples, self._push = 0, []
+        self._unknown_slope = self._located
         self._decide(physics.time())
         self._record(physics)
 
@@ -150,29 +155,36 @@ class ControlTask(control.Task):
             sample = math.inf if period is None else self._samples * period
             jump = disturbance.next_edge(t)
             stop = min(
-                end, self._edge, sample, jump, t + disturbance.longest, _foreseen(self._trace)
+                end,
+                self._edge,
+                sample,
+                jump,
+                t + disturbance.longest,
+                crossing.foreseen(self._trace),
             )
             if self._unknown_slope:
                 stop = min(stop, t + probe)
                 self._unknown_slope = False
             torque, rate = disturbance.line(t, stop)
+            if self._push:
+                torque = [x + y for x, y in zip(torque, self._push, strict=True)]
             value, rates = self._thrust + torque, self._slope + rate
             physics.begin(value, rates)
             physics.advance(stop)
-            decided = stop == sample
-            if period is None:
-                stop, decided = self._switching(physics, stop)
+            switched = False
+            if self._located:
+                stop, switched = self._switching(physics, stop)
             if self.recorder:
                 self._accumulate(value, rates, stop - t)
             t, landed = stop, stop in (self._edge, jump)
-            if decided:
-                self._decide(t)
+            if switched or stop == sample:
+                self._switch(t, sampled=stop == sample)
             elif landed or any(self._slope):
                 self._follow_thrust(t)
-            if decided or landed:
+            if switched or landed or stop == sample:
                 self._trace = self._trace[-1:]
                 # From a zero of its own the event function can only come back once, which shows.
-                self._unknown_slope = landed and period is None
+                self._unknown_slope = landed and self._located
                 self._record(physics)
         self._record(physics)
 
@@ -188,19 +200,35 @@ class ControlTask(control.Task):
             return self._least_event(t)
 
         points = [*self._trace, (stop, self._least_event(stop))]
-        if points[-1][1] > 0 and (dip := _suspected_dip(points)) is not None:
+        if points[-1][1] > 0 and (dip := crossing.suspected_dip(points)) is not None:
             inside = (dip, carried_to(dip))
             points[-1] = inside if inside[1] <= 0 else (stop, carried_to(stop))
         if points[-1][1] <= 0:
-            points.append(_first_not_positive(carried_to, points))
+            points.append(crossing.first_not_positive(carried_to, points))
             if physics.time() != points[-1][0]:
                 physics.advance(points[-1][0])
         self._trace = points[-4:]
         return points[-1][0], points[-1][1] <= 0
 
     def _least_event(self, t: float) -> float:
+        least = self._law_event(t)
+        if self._ways:
+            least = min(least, *self._disturbance.events(self._rates(), self._ways))
+        return least
+
+    def _law_event(self, t: float) -> float:
         events = self._controller.events(t, self._measure(), self._memory)
         return min(events) if events else 1.0
+
+    def _switch(self, t: float, *, sampled: bool) -> None:
+        """Lets those decide whose instant it is: the law, and the torques that follow a rate."""
+        if self._ways:
+            self._ways = self._disturbance.turned(self._rates(), self._ways)
+        if sampled or self._law_event(t) <= 0:
+            self._decide(t)
+        else:
+            self._follow_thrust(t)
+            self._trace = [(t, self._least_event(t))]
 
     def _decide(self, t: float) -> None:
         """Lets the controller step on the present readings and issues its command."""
@@ -217,8 +245,11 @@ class ControlTask(control.Task):
         self._follow_thrust(t)
 
     def _follow_thrust(self, t: float) -> None:
-        """Takes thrust and slope just after `t`, and the next edge, from the thrusters."""
+        """Takes thrust, slope and following torques just after `t`, and the next edge."""
         self._thrust, self._slope, self._edge = self._thrusters.line(t, self._state)
+        if self._ways:
+            thrust = dict(zip(self._thrusters.names, self._thrust, strict=True))
+            self._push = self._disturbance.push(self._ways, thrust)
 
     # -- the record ------------------------------------------------------------------------------
 
@@ -247,10 +278,14 @@ class ControlTask(control.Task):
         t = physics.time()
         self.recorder.add(
             [
-                *(t, *self._read(), *self._thrust, *self._disturbance.value(t)),
+                *(t, *self._read(), *self._thrust, *self._torque(t)),
                 *(*self._command, *self._impulse, *self._spent, *physics.coordinates()),
             ]
         )
+
+    def _torque(self, t: float) -> list[float]:
+        torque = self._disturbance.value(t)
+        return [a + b for a, b in zip(torque, self._push, strict=True)] if self._push else torque
 
     def _accumulate(self, value: list[float], slope: list[float], span: float) -> None:
         """Adds a piece to the impulses; no thrust changes its sign within one."""
@@ -262,101 +297,8 @@ class ControlTask(control.Task):
                 spent[i] += abs(impulse)
 
 
-Point = tuple[float, float]  # time, least event function
-WIDTH = 1e-11  # to which a switching instant is located, s
 _PROBE = 0.05  # share of a control step after which a new smooth stretch is looked at first: it
 # gives the slope by which a dip across zero and back is suspected, and a crossing foreseen
-
-
-def _foreseen(points: Sequence[Point]) -> float:
-    """When the event function will cross zero, extrapolated from its last points; inf if not.
-
-    Cutting the piece there spares most of the repetitions that `_first_not_positive` would need.
-    The first cut falls just short of the crossing, the next one just behind it.
-    """
-    if len(points) < 3:
-        return math.inf
-    t, before = points[-1][0], points[-2]
-    ahead = _root_of_parabola(points[-1], before, points[-3])
-    if ahead < math.inf and len(points) > 3:
-        ahead = _on_cubic(ahead, points)
-    if ahead < 0.05 * (t - before[0]):
-        return t + ahead + WIDTH / 2
-    return t + (1 - 3e-5) * ahead
-
-
-def _on_cubic(ahead: float, points: Sequence[Point]) -> float:
-    """Moves a root of the parabola to the cubic through the last four points, by Newton steps."""
-    (t0, f0), (t1, f1), (t2, f2), (t3, f3) = points[-4:]
-    a, b, c = t3 - t2, t3 - t1, t3 - t0
-    d1, d2, d3 = (f3 - f2) / a, (f2 - f1) / (t2 - t1), (f1 - f0) / (t1 - t0)
-    e1, e2 = (d1 - d2) / b, (d2 - d3) / (t2 - t0)
-    g = (e1 - e2) / c
-    for _ in range(2):
-        u, v, w = ahead, ahead + a, ahead + b
-        value = f3 + u * (d1 + v * (e1 + w * g))
-        slope = d1 + (u + v) * e1 + (u * v + v * w + w * u) * g
-        if slope >= 0:
-            return math.inf
-        ahead -= value / slope
-    return max(ahead, 0.0)
-
-
-def _suspected_dip(points: Sequence[Point]) -> float | None:
-    """Where a parabola through the last three points dips between the last two, if it may cross 0.
-
-    While the function curves upwards its slope over the last piece was steeper than it is now: only
-    if that slope leads below zero can there be a pair of zeros between two positive ends.
-    """
-    if len(points) < 3:
-        return None
-    (t0, f0), (t1, f1), (t2, f2) = points[-3:]
-    slope = (f1 - f0) / (t1 - t0)
-    if slope >= 0 or f1 + slope * (t2 - t1) > 0:
-        return None
-    curvature = ((f2 - f1) / (t2 - t1) - slope) / (t2 - t0)
-    dip = (t0 + t1) / 2 - slope / (2 * curvature)
-    return dip if t1 < dip < t2 else None
-
-
-def _first_not_positive(function: Callable[[float], float], points: Sequence[Point]) -> Point:
-    """Narrows a sign change to the last bits of the clock, from the side that is not positive.
-
-    Args:
-        function: The event function.
-        points: The last two bracket the sign change; an earlier one, if any, shows the curvature.
-
-    Returns:
-        A point within `WIDTH` after the sign change.
-    """
-    *earlier, a, b = points
-    third = earlier[-1] if earlier else None
-    width = max(WIDTH, 4 * math.ulp(b[0]))
-    for k in range(100):
-        span = b[0] - a[0]
-        if span <= width or -b[1] <= width * (a[1] - b[1]) / span:
-            break
-        step = span / 2 if k % 5 == 4 else _root_of_parabola(a, b, third)
-        t = a[0] + min(max(step + width / 2, width / 2), span - width / 2)
-        point = (t, function(t))
-        if point[1] > 0:
-            a, third = point, a
-        else:
-            b, third = point, b
-    return b
-
-
-def _root_of_parabola(a: Point, b: Point, third: Point | None) -> float:
-    """How far after a the parabola, or chord, through the points first falls to zero; or inf."""
-    (ta, fa), (tb, fb) = a, b
-    slope, curvature = (fb - fa) / (tb - ta), 0.0
-    if third is not None:
-        curvature = ((third[1] - fb) / (third[0] - tb) - slope) / (third[0] - ta)
-    slope -= curvature * (tb - ta)  # at a
-    discriminant = slope * slope - 4 * curvature * fa
-    if discriminant < 0 or (fall := math.sqrt(discriminant) - slope) <= 0:
-        return math.inf
-    return 2 * fa / fall
 
 
 def _scattered(initial: Initial, random: np.random.Generator) -> Initial:

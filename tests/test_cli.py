@@ -260,7 +260,7 @@ def test_numbers_that_cannot_be_are_refused(setting, tmp_path, capsys):
         (["controller.gain=3.5"], ["gamma < 3", "3.5"]),
         (["controller.gain=1.5"], ["gamma > E/(10 - 9E)", "1.5", "2.70462"]),
         (["controller.radius=0.001"], ["eps < R", "0.007", "0.001"]),
-        (["thrusters.all.delay=0.0"], ["'thruster_z' has no delay", "controller.period"]),
+        (["thrusters.all.delay=0.0"], ["'thruster_z' has neither delay", "controller.period"]),
         (["simulation.timestep=0.05"], ["timestep 0.05", "stability limit 0.03"]),
         (["thrusters.all.levels=[1.0]"], ["lacks 8.2826625", "levels = [1, 8.2826625"]),
         (["booms.all.root=lft_root"], ["site 'lft_root'", "mean 'left_root'?", "right_root"]),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.efremov import MultilevelRelay
-from spacecraft_sim import beam, task
+from spacecraft_sim import beam, crossing, task
 from spacecraft_sim.delay import Delay
 from spacecraft_sim.disturbance import Disturbance, Torque
 from spacecraft_sim.modal_form import modal_form, row_of, system_of
@@ -157,7 +157,7 @@ def test_the_same_law_flies_to_the_same_switchings_on_the_reduced_plant(modes, d
     run = propagate(system, start=start, duration=20.0, delay=delay, disturbance=torque)
     errors = []
     for width in (1e-11, 1e-12):
-        monkeypatch.setattr(task, "WIDTH", width)  # to which a flight locates a switching
+        monkeypatch.setattr(crossing, "WIDTH", width)  # to which a flight locates a switching
         plant = ReducedPhysics(model, start=galerkin_start(modes), timestep=0.02)
         flight = task.ControlTask(
             law,
