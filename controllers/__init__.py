@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from controllers import efremov, efremov_observer
+from controllers import efremov, efremov_observer, phase_plane, pwpf, schmitt_trigger
 from spacecraft_sim.controller import Controller
 from spacecraft_sim.guarantee import Guarantee
 
@@ -12,4 +12,7 @@ REGISTRY: dict[str, Design] = {
     "efremov_local": efremov.design_local,
     "efremov_nonlocal": efremov.design_nonlocal,
     "efremov_observed": efremov_observer.design_observed,
+    "phase_plane": phase_plane.design,
+    "pwpf": pwpf.design,
+    "schmitt_trigger": schmitt_trigger.design,
 }

@@ -2,7 +2,7 @@
 
 Law.  Where the angle x leaves the dead band and the rate v leads further out, the thruster fires
 until the rate leads back in at the drift rate; the spacecraft then coasts to the other end, or
-falls back where a steady torque turns it.  A limit cycle has two pulses, or one under such a torque.
+falls back where a steady torque turns it.  A limit cycle has two pulses, or one under such torque.
 
 B. Wie, "Space Vehicle Dynamics and Control" (AIAA, 2008), section 7.4.  Nothing is guaranteed.
 """

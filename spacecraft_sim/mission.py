@@ -14,6 +14,7 @@ from pydantic import create_model
 
 from controllers import REGISTRY, Design
 from spacecraft_sim import beam, config, conservation, library, linearize, mjcf, reduced, spacecraft
+from spacecraft_sim.chart import charts_of, portraits
 from spacecraft_sim.checks import choices
 from spacecraft_sim.compare import Comparison, compare
 from spacecraft_sim.controller import Controller
@@ -54,19 +55,24 @@ class Mission:
     thrusters: dict[PlantName, Thrusters]
     disturbance: Disturbance
 
+    @property
+    def accuracy(self) -> float | None:
+        """The accuracy asked of the law, or that its charts promise, rad; None if there is none."""
+        bands = [portrait.band for portrait in portraits(charts_of(self.controller))]
+        return self.scenario.controller.get("accuracy", next(iter(bands), None))
+
     def environment(self, plant: PlantName = "mujoco") -> Environment:
         """Returns a dm_control environment with the law closed inside its task.
 
         Args:
             plant: Which plant.
         """
-        accuracy = self.scenario.controller.get("accuracy", 1e-2)
         task = ControlTask(
             self.controller,
             self.thrusters[plant],
             initial=self.scenario.initial,
             disturbance=self.disturbance,
-            accuracy=accuracy,
+            accuracy=self.accuracy or 1e-2,
             seed=self.scenario.seed,
         )
         return Environment(

@@ -88,7 +88,16 @@ def _heading(figure: Figure, title: str, verdicts: Sequence[Verdict], y: float) 
     figure.text(0.988, y, f"{kept} of {len(verdicts)} claims hold", **style)
 
 
-def _panel(axes: Axes, title: str, x: str, y: str, middle: bool = False) -> None:
+def panel(axes: Axes, title: str, x: str, y: str, middle: bool = False) -> None:
+    """Gives axes the look of this house.
+
+    Args:
+        axes: The axes.
+        title: What they show.
+        x: Label of the x axis.
+        y: Label of the y axis.
+        middle: Whether the key, if there is one, stands in the middle.
+    """
     axes.set_title(title, size=10.5, color=INK, loc="left", y=1.0, weight="bold", pad=5)
     axes.set_xlabel(x, size=9, color=SOFT, labelpad=2)
     axes.set_ylabel(y, size=9, color=SOFT, labelpad=3)
@@ -221,7 +230,7 @@ def _angle(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
             axes.set_yticks([], minor=True)
             axes.set_ylim(-1.6 * limit, 25 * limit)  # room for the legend
             label = f"{unit}, log beyond the peak"
-    _panel(axes, f"Quasi-rigid angle, {WHEN[zoom]}", "time, s", label)
+    panel(axes, f"Quasi-rigid angle, {WHEN[zoom]}", "time, s", label)
 
 
 def _attitude(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
@@ -230,7 +239,7 @@ def _attitude(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
         for limit in (-band / scale, band / scale):
             axes.axhline(limit, color=GOOD, linewidth=1, linestyle=":")
         axes.set_ylim(top=1.8 * max(peak, band / scale))  # room for the legend
-    _panel(axes, f"Attitude of the bus, {WHEN[zoom]}", "time, s", f"attitude, {unit}")
+    panel(axes, f"Attitude of the bus, {WHEN[zoom]}", "time, s", f"attitude, {unit}")
 
 
 def _histories(
@@ -239,19 +248,19 @@ def _histories(
     """Draws the moving axes; returns their peak and a unit that suits it and `also`, with name."""
     moving = moving_axes(flights[1], kind)
     peak = max((_peak(flights[1][f"{kind}_{axis}"]) for axis in moving), default=0.0)
-    scale, prefix = _prefix(max(peak, also))
+    scale, letter = prefix(max(peak, also))
     for axis, dashes in zip(moving, ("-", "--", ":"), strict=False):
         for flight, (plant, color, width) in zip(flights, PLANTS, strict=True):
             if (value := flight.signals.get(f"{kind}_{axis}")) is not None:
                 look = {"color": color, "linewidth": width, "linestyle": dashes}
                 axes.plot(flight.time, value / scale, label=f"{axis}, {plant}", **look)
     axes.set_xlim(flights[1].time[0], flights[1].time[-1])
-    return peak / scale, scale, f"{prefix}rad"
+    return peak / scale, scale, f"{letter}rad"
 
 
 def _tips(axes: Axes, flights: Flights, booms: Sequence[str], zoom: bool) -> None:
     signals = [s for s in (f"{boom}_tip_y" for boom in booms) if s in flights[1].signals]
-    scale, prefix = _prefix(max((_peak(flights[1][s]) for s in signals), default=0.0))
+    scale, letter = prefix(max((_peak(flights[1][s]) for s in signals), default=0.0))
     for k, signal in enumerate(s for s in signals if s in flights[0].signals):
         label, value = None if k else "reduced", flights[0][signal] / scale
         axes.plot(flights[0].time, value, color=PLANTS[0][1], linewidth=3.2, label=label)
@@ -260,15 +269,15 @@ def _tips(axes: Axes, flights: Flights, booms: Sequence[str], zoom: bool) -> Non
         width, value = max(2.2 - 1.2 * k, 0.8), flights[1][signal] / scale
         axes.plot(flights[1].time, value, color=BOOMS[k % 5], linewidth=width, label=signal[:-6])
     axes.set_xlim(flights[1].time[0], flights[1].time[-1])
-    _panel(axes, f"Boom tips, {WHEN[zoom]}", "time, s", f"tip deflection y, {prefix}m")
+    panel(axes, f"Boom tips, {WHEN[zoom]}", "time, s", f"tip deflection y, {letter}m")
 
 
 def _phase_plane(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
     axis = next(iter(moving_axes(flights[1], "quasi_rigid_angle")), "")
     x, y = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
     if not all(signal in flights[1].signals for signal in (x, y)):
-        return _panel(axes, f"Phase plane, {WHEN[zoom]}", "not recorded", "")
-    (sx, px), (sy, py) = _prefix(_peak(flights[1][x])), _prefix(_peak(flights[1][y]))
+        return panel(axes, f"Phase plane, {WHEN[zoom]}", "not recorded", "")
+    (sx, px), (sy, py) = prefix(_peak(flights[1][x])), prefix(_peak(flights[1][y]))
     for flight, (plant, color, width) in zip(flights, PLANTS, strict=True):
         if x in flight.signals and y in flight.signals:
             axes.plot(flight[x] / sx, flight[y] / sy, color=color, linewidth=width, label=plant)
@@ -277,7 +286,7 @@ def _phase_plane(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
         axes.plot(x0, y0, "o", color=INK, markersize=4, label="start")
         axes.axvspan(-band / sx, band / sx, color=GOOD, alpha=0.25, linewidth=0)
     labels = f"quasi-rigid angle {axis}, {px}rad", f"quasi-rigid rate {axis}, {py}rad/s"
-    return _panel(axes, f"Phase plane, {WHEN[zoom]}", *labels, middle=zoom)
+    return panel(axes, f"Phase plane, {WHEN[zoom]}", *labels, middle=zoom)
 
 
 def _thrust(axes: Axes, measured: Trajectory, drawing: Drawing, span: tuple[float, float]) -> None:
@@ -300,7 +309,7 @@ def _thrust(axes: Axes, measured: Trajectory, drawing: Drawing, span: tuple[floa
     axes.set_xlim(*span)
     when, unit = "to the end" if span[0] else "from the start", set(channels.values())
     words = f"Thrust {when}: filled as delivered, line as commanded"
-    _panel(axes, words, "time, s", f"{' or '.join(sorted(unit))}, log levels")
+    panel(axes, words, "time, s", f"{' or '.join(sorted(unit))}, log levels")
 
 
 def _log_heights(levels: Array) -> Callable[[Array], Array]:
@@ -374,7 +383,11 @@ def _peak(value: Array) -> float:
     return float(np.abs(value).max(initial=0.0))
 
 
-def _prefix(peak: float) -> tuple[float, str]:
-    """A scale that brings the peak above one half, and the prefix of the unit."""
+def prefix(peak: float) -> tuple[float, str]:
+    """Returns a scale that brings the peak above one half, and the prefix of the unit.
+
+    Args:
+        peak: The largest value, in the unit itself.
+    """
     prefixes = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
     return next((p for p in prefixes if peak >= p[0] / 2), prefixes[0])

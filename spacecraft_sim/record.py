@@ -10,6 +10,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from spacecraft_sim import record_chart
+from spacecraft_sim.chart import Charts
 from spacecraft_sim.drawing import Drawing, Jet, Shape, boom_points, channel_units, turned
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.trajectory import Trajectory, moving_axes
@@ -46,6 +48,7 @@ def write(
     scenario_toml: str,
     title: str,
     band: float | None = None,
+    charts: Charts = (),
 ) -> None:
     """Writes a recording with its blueprint; nothing is sent anywhere else.
 
@@ -58,12 +61,13 @@ def write(
         scenario_toml: The scenario, as text.
         title: Name of the recording.
         band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
+        charts: What the law draws beside its theorem.
     """
     stream = Stream("spacecraft_sim")
     stream.save(path)
     with stream:  # the file is complete when the block ends
         stream.send_recording_name(title)
-        stream.send_blueprint(_blueprint(_extent(drawing)))
+        stream.send_blueprint(_blueprint(_extent(drawing), charts))
         _documents(stream, verdicts, scenario_toml, title)
         _solids(stream, drawing)
         _plumes(stream, drawing, measured)
@@ -72,6 +76,7 @@ def write(
         _thrust(stream, measured, drawing)
         _phase_plane(stream, "phase/whole", (predicted, measured), 0.0)
         _phase_plane(stream, "phase/end", (predicted, measured), measured.time[-1] - FINAL)
+        record_chart.log(stream, measured, charts)
         _events(stream, measured, drawing, verdicts)
 
 
@@ -314,7 +319,7 @@ def _documents(stream: Stream, verdicts: Verdicts, scenario_toml: str, title: st
         stream.log(path, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
 
 
-def _blueprint(extent: float) -> rrb.Blueprint:
+def _blueprint(extent: float, charts: Charts) -> rrb.Blueprint:
     """The layout; only the camera's distance follows the spacecraft, whose size is `extent`, m."""
     boundary = rr.TimeRangeBoundary
     ever = boundary.infinite()
@@ -351,9 +356,14 @@ def _blueprint(extent: float) -> rrb.Blueprint:
             plot("rate", "Rate [rad/s]"), plot("quasi_rigid_rate", "Quasi-rigid rate [rad/s]")
         ),
     )
-    switching = rrb.Vertical(
+    planes = (
         plane("phase/whole", "Phase plane: right = angle/max, up = rate/max"),
         plane("phase/end", "Phase plane of the last minute, scaled likewise"),
+    )
+    drawn = record_chart.views(charts)
+    upper = (rrb.Tabs(*drawn), rrb.Tabs(*planes)) if drawn else planes
+    switching = rrb.Vertical(
+        *upper,
         plot("thrust", "Thrust, near the cursor", near),
         rrb.StateTimelineView(origin="relay", name="Relay, near the cursor", time_view=near),
         row_shares=[3, 3, 2, 1.4],

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from spacecraft_sim import config
+from spacecraft_sim.chart import charts_of
 from spacecraft_sim.compare import Comparison
 from spacecraft_sim.guarantee import Assumption, Verdict
 from spacecraft_sim.mission import Mission
@@ -90,7 +91,7 @@ def write_pictures(
     predicted: Trajectory,
     comparison: Comparison,
 ) -> None:
-    """Writes `summary.png` and `recording.rrd`.
+    """Writes `summary.png`, `recording.rrd` and, for a law that has charts, `charts.png`.
 
     Args:
         folder: The folder of the run.
@@ -99,18 +100,23 @@ def write_pictures(
         predicted: Flight of the reduced plant.
         comparison: How it came out.
     """
-    from spacecraft_sim import drawing, plots, record
+    from spacecraft_sim import drawing, plots, plots_chart, record
 
+    charts = charts_of(mission.controller)
     shown = {
         "measured": measured,
         "predicted": predicted,
         "drawing": drawing.draw(mission.mujoco.model.ptr, mission.machine, measured),
         "verdicts": comparison.verdicts,
         "title": mission.scenario.title,
-        "band": mission.scenario.controller.get("accuracy"),
+        "band": mission.accuracy,
     }
     plots.summary(folder / "summary.png", **shown)
-    record.write(folder / "recording.rrd", scenario_toml=resolved(mission.scenario), **shown)
+    if charts:
+        title = mission.scenario.title
+        plots_chart.page(folder / "charts.png", measured=measured, charts=charts, title=title)
+    text = resolved(mission.scenario)
+    record.write(folder / "recording.rrd", scenario_toml=text, charts=charts, **shown)
 
 
 def _plain(verdict: Verdict) -> dict[str, Any]:

@@ -42,10 +42,10 @@ def imports(path, module):
 
 
 ONLY_IN = {
-    "mujoco": {"mjcf", "readings", "physics", "linearize", "drawing"},
+    "mujoco": {"mjcf", "readings", "physics", "linearize", "drawing", "elastic_mjcf"},
     "dm_control": {"physics", "reduced", "task", "simulate"},
-    "rerun": {"record"},
-    "matplotlib": {"plots"},
+    "rerun": {"record", "record_chart"},
+    "matplotlib": {"plots", "plots_chart"},
     "controllers": {"mission", "cli"},
 }
 

@@ -20,7 +20,9 @@ MACHINES = {
     "two_boom": (1183.2375, 1.0),
     "two_boom_free": (1183.2375, 5.0),
     "two_boom_twin": (1183.240355, 1.0),
+    "rigid_bus": (80.0, 1.0),
 }
+MODES = {"rigid_bus": 0}  # elastic modes of the reduced plant, where not two
 CLOSE = {"max_delay": 0.21, "accuracy": 0.007, "c": 0.31}  # Efremov et al. (2006), section 5
 CONTROLLERS = {
     "efremov_local": CLOSE,
@@ -34,6 +36,9 @@ CONTROLLERS = {
         "disturbance": 8.6e-7,
         "angle_noise": 2e-5,
     },
+    "phase_plane": {"dead_band": 1e-3, "drift": 2e-4},
+    "pwpf": {"bandwidth": 0.5},
+    "schmitt_trigger": {"threshold": 1e-3, "lead": 2.0},
 }
 # Accelerations that the laws need, rad/s^2: p 3^k with p of Theorems 1 and 2.
 ACCELERATIONS = {
@@ -41,6 +46,11 @@ ACCELERATIONS = {
     "efremov_nonlocal": [3.75 * 0.31**2 * 0.007 * 2.765 * 3**k for k in range(5)],
 }
 ACCELERATIONS["efremov_observed"] = ACCELERATIONS["efremov_nonlocal"]
+ACCELERATIONS |= dict.fromkeys(("phase_plane", "pwpf", "schmitt_trigger"), [1e-3])
+# Thrusters of the laws that are made for a minimum on-time; the others act 0.2 s late.
+PULSED = {
+    law: {"delay": 0.0, "min_on_time": 0.05} for law in ("phase_plane", "pwpf", "schmitt_trigger")
+}
 PAIRS = list(itertools.product(REGISTRY, library.spacecraft_names()))
 
 
@@ -55,9 +65,9 @@ def ready(law, machine):
         "duration": 4.0,
         "initial": {"attitude": (0.0, 0.0, 0.0015), "boom_amplitude": 0.02},
         "controller": {"law": law, **CONTROLLERS[law]},
-        "thrusters": {"all": {"levels": levels, "delay": 0.2}},
+        "thrusters": {"all": {"levels": levels, "delay": 0.2, **PULSED.get(law, {})}},
         "disturbance": {"z": {"amplitude": 0.001, "frequency": 1.0}},
-        "reduced": {"source": "mjcf", "modes": 2},
+        "reduced": {"source": "mjcf", "modes": MODES.get(machine, 2)},
     }
     return mission.assemble(Scenario.model_validate(table))
 

@@ -1,0 +1,155 @@
+"""The charts of a law on one page: phase portraits with the flight, pulses, maps of parameters."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from spacecraft_sim.chart import Charts, Line, Map, Portrait, portraits, pulses, worst_to_come
+from spacecraft_sim.plots import BAD, DPI, GOOD, INK, MINUS, PLUS, SOFT, panel, prefix
+from spacecraft_sim.trajectory import Trajectory
+
+Array = np.ndarray
+
+LOOKS = {
+    "bound": {"color": GOOD, "linewidth": 2.2},
+    "switching": {"color": "#7a3fb5", "linewidth": 1.6, "linestyle": "--"},
+    "aid": {"color": SOFT, "linewidth": 0.9},
+}
+REGIONS = ("#ffd9a8", "#cfe3ff", "#e6dcf7", "#d9f2df")
+FLIGHT = "#1f6fd6"
+
+
+def page(path: Path, *, measured: Trajectory, charts: Charts, title: str) -> None:
+    """Draws the charts of a law, one row a portrait and one for the maps.
+
+    Args:
+        path: The PNG file.
+        measured: The flight.
+        charts: Portraits and maps.
+        title: One line over the page.
+    """
+    drawn, maps = portraits(charts), [chart for chart in charts if isinstance(chart, Map)]
+    rows = max(len(drawn), 1)
+    figure = Figure(figsize=(18.0, 9.6 * rows + 0.6), dpi=DPI)
+    FigureCanvasAgg(figure)
+    figure.text(0.012, 1 - 0.3 / (9.6 * rows + 0.6), title, size=17, weight="bold", color=INK,
+                va="center")  # fmt: skip
+    grid = figure.add_gridspec(
+        rows, 2, left=0.05, right=0.985, top=1 - 0.9 / (9.6 * rows + 0.6),
+        bottom=0.55 / (9.6 * rows + 0.6), wspace=0.16, hspace=0.2, width_ratios=(1.15, 1),
+    )  # fmt: skip
+    for k, portrait in enumerate(drawn):
+        _portrait(figure.add_subplot(grid[k, 0]), portrait, measured)
+        mine = maps[k : k + 1]
+        side = grid[k, 1].subgridspec(2 + len(mine), 1, hspace=0.42,
+                                      height_ratios=(1, 1, *(1.5 for _ in mine)))  # fmt: skip
+        _history(figure.add_subplot(side[0]), portrait, measured)
+        _pulses(figure.add_subplot(side[1]), portrait, measured)
+        for j, chart in enumerate(mine):
+            _map(figure.add_subplot(side[2 + j]), chart)
+    figure.savefig(path, pil_kwargs={"compress_level": 3})
+
+
+def _portrait(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
+    """Regions, lines, the flight; the flight is wide and red where the thruster may not stop."""
+    x, y = (measured[name] for name in portrait.signals)
+    (sx, px), (sy, py) = _scales(portrait, x, y)
+    for region, color in zip(portrait.regions, REGIONS, strict=False):
+        axes.fill(*(region.outline / (sx, sy)).T, color=color, alpha=0.8, linewidth=0,
+                  label=region.name, zorder=1)  # fmt: skip
+    _lines(axes, portrait.lines, (sx, sy))
+    points = np.stack([x / sx, y / sy], axis=1)
+    axes.plot(*points.T, color=FLIGHT, linewidth=1.0, label="flight", zorder=4)
+    if portrait.min_on_time:
+        locked = _locked(measured, portrait)
+        pairs = np.stack([points[:-1], points[1:]], axis=1)[locked[:-1]]
+        axes.add_collection(LineCollection(list(pairs), color=BAD, linewidth=2.0, zorder=5,
+                                           label="minimum on-time running"))  # fmt: skip
+    axes.plot(*points[0], "o", color=INK, markersize=5, label="start", zorder=6)
+    half = [_half_width(portrait, k) / (sx, sy)[k] for k in (0, 1)]
+    axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]))
+    quantities = [name.replace("_", " ") for name in portrait.signals]
+    units = (f"{px}{measured.units[portrait.signals[0]]}",
+             f"{py}{measured.units[portrait.signals[1]]}")  # fmt: skip
+    panel(axes, portrait.title, *(f"{q}, {u}" for q, u in zip(quantities, units, strict=True)))
+
+
+def _scales(portrait: Portrait, x: Array, y: Array) -> tuple[tuple[float, str], tuple[float, str]]:
+    half = [_half_width(portrait, k) for k in (0, 1)]
+    return prefix(half[0] or float(np.abs(x).max())), prefix(half[1] or float(np.abs(y).max()))
+
+
+def _half_width(portrait: Portrait, k: int) -> float:
+    """Half the window: a little more than what is guaranteed, so that the contour fills it."""
+    shown = [line.points[:, k] for line in portrait.lines if line.look == "bound"]
+    return 1.45 * max((float(np.nanmax(np.abs(points))) for points in shown), default=0.0)
+
+
+def _locked(measured: Trajectory, portrait: Portrait) -> Array:
+    """Whether the pulse that is on at a row is still younger than the minimum on-time."""
+    sign = np.sign(measured[portrait.channel])
+    began = np.r_[True, np.diff(sign) != 0]
+    age = (
+        measured.time
+        - measured.time[np.maximum.accumulate(np.where(began, np.arange(len(sign)), 0))]
+    )
+    return (sign != 0) & (age < portrait.min_on_time * (1 - 1e-9))
+
+
+def _lines(axes: Axes, lines: Sequence[Line], scales: tuple[float, float]) -> None:
+    named: set[str] = set()
+    for line in lines:
+        label = None if line.name in named else line.name
+        named.add(line.name)
+        axes.plot(*(line.points / scales).T, label=label, zorder=3, **LOOKS[line.look])
+
+
+def _history(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
+    """The angle over its band, and the worst that is still to come."""
+    name = portrait.signals[0]
+    value, band = measured[name], portrait.band
+    scale, letter = prefix(2 * band if band else float(np.abs(value).max()))
+    if band:
+        axes.axhspan(-band / scale, band / scale, color=GOOD, alpha=0.12, linewidth=0)
+        axes.axhline(band / scale, color=GOOD, linewidth=1.2, label="guaranteed")
+        axes.axhline(-band / scale, color=GOOD, linewidth=1.2)
+        axes.set_ylim(-2 * band / scale, 2 * band / scale)
+    axes.plot(measured.time, value / scale, color=FLIGHT, linewidth=1.0, label="flight")
+    axes.plot(measured.time, worst_to_come(value) / scale, color=BAD, linewidth=1.2,
+              label="largest still to come")  # fmt: skip
+    axes.set_xlim(measured.time[0], measured.time[-1])
+    words = name.replace("_", " ")
+    panel(axes, "In its band", "time, s", f"{words}, {letter}{measured.units[name]}")
+
+
+def _pulses(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
+    """A stem a pulse: when it began and how long it was, over the minimum."""
+    thrust = measured[portrait.channel]
+    start, length = pulses(measured.time, thrust)
+    positive = np.array([measured[portrait.channel][np.searchsorted(measured.time, t)] > 0
+                         for t in start], dtype=bool)  # fmt: skip
+    for mask, color, word in ((positive, PLUS, "positive"), (~positive, MINUS, "negative")):
+        if mask.any():
+            axes.vlines(start[mask], 0, length[mask], color=color, linewidth=1.0, alpha=0.6)
+            axes.plot(start[mask], length[mask], ".", color=color, label=f"{word} pulse")
+    if portrait.min_on_time:
+        axes.axhline(portrait.min_on_time, color=INK, linewidth=1.2, label="minimum on-time")
+    axes.set_xlim(measured.time[0], measured.time[-1])
+    axes.set_ylim(0, 1.35 * max(length.max(initial=0.0), portrait.min_on_time, 1e-9))
+    least = f", the shortest {length.min():.6g} s" if len(length) else ""
+    panel(axes, f"{len(length)} pulses{least}", "time, s", "length, s")
+
+
+def _map(axes: Axes, chart: Map) -> None:
+    for region, color in zip(chart.regions, REGIONS, strict=False):
+        axes.fill(*region.outline.T, color=color, alpha=0.9, linewidth=0, label=region.name)
+    looks = ("-", "--", "-.", ":")
+    for line, dashes in zip(chart.lines, looks * len(chart.lines), strict=False):
+        axes.plot(*line.points.T, color=INK, linewidth=1.2, linestyle=dashes, label=line.name)
+    axes.plot(*chart.point, "*", color=BAD, markersize=15, label="here", zorder=9)
+    panel(axes, chart.title, *chart.labels)
