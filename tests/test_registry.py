@@ -46,11 +46,10 @@ ACCELERATIONS = {
     "efremov_nonlocal": [3.75 * 0.31**2 * 0.007 * 2.765 * 3**k for k in range(5)],
 }
 ACCELERATIONS["efremov_observed"] = ACCELERATIONS["efremov_nonlocal"]
-ACCELERATIONS |= dict.fromkeys(("phase_plane", "pwpf", "schmitt_trigger"), [1e-3])
+BASELINES = ("phase_plane", "pwpf", "schmitt_trigger")
+ACCELERATIONS |= {law: [1e-3] for law in BASELINES}
 # Thrusters of the laws that are made for a minimum on-time; the others act 0.2 s late.
-PULSED = {
-    law: {"delay": 0.0, "min_on_time": 0.05} for law in ("phase_plane", "pwpf", "schmitt_trigger")
-}
+PULSED = {law: {"delay": 0.0, "min_on_time": 0.05} for law in BASELINES}
 PAIRS = list(itertools.product(REGISTRY, library.spacecraft_names()))
 
 
