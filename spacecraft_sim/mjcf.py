@@ -138,37 +138,32 @@ def export(spacecraft: Spacecraft, path: Path) -> None:
     spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
     for element in root.iter("body"):
-        if element.get("name") in _grown(spacecraft):
-            _write_all_digits(element, spec)
+        _write_all_digits(element, spec)
     ElementTree.indent(root)
     path.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
 
 
-def _grown(spacecraft: Spacecraft) -> set[str]:
-    """Names of the bodies that booms add to the bus."""
-    names = {name for boom in spacecraft.booms for name in hinge_names(boom)}
-    ends = {f"{boom.name}_{end}" for boom in spacecraft.booms for end in ("0", "tip_mass")}
-    return names | ends
-
-
 def _write_all_digits(element: ElementTree.Element, spec: mujoco.MjSpec) -> None:
-    """Replaces the six digits that MuJoCo writes of a boom's body by all that there are."""
-    body = spec.body(element.get("name"))
-    numbers = {
-        "body": {"pos": body.pos, "quat": body.quat},
-        "inertial": {"pos": body.ipos, "mass": body.mass, "diaginertia": body.inertia},
-    }
-    parts = [element, *element.findall("inertial")]
-    for joint in element.findall("joint"):
-        found = spec.joint(joint.get("name"))
-        numbers["joint"] = {"stiffness": found.stiffness[0], "damping": found.damping[0]}
-        parts.append(joint)
-    for site in element.findall("site"):
-        numbers["site"] = {"pos": spec.site(site.get("name")).pos}
-        parts.append(site)
-    for part in parts:
-        for key, value in numbers[part.tag].items():
-            part.set(key, " ".join(repr(float(x)) for x in np.atleast_1d(value)))
+    """Replaces the six digits that MuJoCo writes of a body and its joints by all that there are."""
+    finders = {"body": spec.body, "joint": spec.joint, "site": spec.site}
+    for part in (element, *element):
+        owner = element if part.tag == "inertial" else part
+        find, name = finders.get(owner.tag), owner.get("name")
+        if find is None or not name:
+            continue
+        found = find(name)
+        for key in _WRITTEN.intersection(part.keys()):
+            value = getattr(found, _INERTIAL[key] if part.tag == "inertial" else key)
+            # A stiffness has higher terms too, and an axis-aligned inertia no more than three.
+            count = len(part.get(key, "").split())
+            part.set(key, " ".join(repr(float(x)) for x in np.atleast_1d(value)[:count]))
+
+
+_INERTIAL = {
+    "pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia",
+    "fullinertia": "fullinertia",
+}  # fmt: skip
+_WRITTEN = {*_INERTIAL, "axis", "stiffness", "damping"}
 
 
 def hinge_names(boom: Boom) -> list[str]:

@@ -6,11 +6,10 @@ import shutil
 import tomllib
 
 import mujoco
-import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from spacecraft_sim import cli, library, mjcf, spacecraft, versions
+from spacecraft_sim import cli, library, versions
 from spacecraft_sim.trajectory import Trajectory
 
 NAME, ATTITUDE = "efremov-nonlocal", "attitude_z"
@@ -69,33 +68,6 @@ def test_explain_gives_parameters_units_defaults_predictions_and_source(capsys):
     assert "Efremov et al. 2006" in shown
     assert "0.826439" in shown  # the period of the limit cycle
     assert "c h0 < ln(15/14): 0.0651 < 0.0689929" in shown
-
-
-@pytest.mark.parametrize("name", [*library.spacecraft_names(), NAME])
-def test_export_writes_one_file_that_plain_mujoco_flies(name, tmp_path, capsys):
-    path = tmp_path / "machine.xml"
-    assert cli.main(["export", name, str(path)]) == 0
-    assert [p.name for p in tmp_path.iterdir()] == ["machine.xml"]
-    model = mujoco.MjModel.from_xml_path(str(path))
-    data = mujoco.MjData(model)
-    compiled = mjcf.compile(spacecraft.load(name), timestep=0.01)
-    # All digits are written: rounding.
-    np.testing.assert_allclose(model.body_mass, compiled.body_mass, rtol=1e-13)
-    np.testing.assert_allclose(model.body_inertia, compiled.body_inertia, rtol=1e-13, atol=1e-15)
-    data.ctrl[:] = 1.0
-    mujoco.mj_step(model, data, 10)
-    assert not data.warning.number.any()
-    assert np.any(data.qvel != 0)
-
-
-def test_export_overwrites_nothing_and_says_what_it_cannot_write(tmp_path, capsys):
-    path = tmp_path / "precious.xml"
-    path.write_text("mine")
-    assert cli.main(["export", "two_boom", str(path)]) == 2
-    assert path.read_text() == "mine"
-    assert "exists already" in capsys.readouterr().err
-    assert cli.main(["export", "two_boom", str(tmp_path / "no" / "x.xml")]) == 2
-    assert "cannot be written" in capsys.readouterr().err
 
 
 # -- the folder of a run --------------------------------------------------------------------------
