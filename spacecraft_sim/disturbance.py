@@ -80,6 +80,7 @@ class Disturbance:
         self.names = tuple(f"disturbance_{axis}" for axis in torques)
         self._torques = tuple(torques.values())
         self._calls = tuple(torque.function() for torque in self._torques)
+        self._steady = tuple(torque.waveform != "sine" for torque in self._torques)
         self._jumping = tuple(t for t in self._torques if t.waveform == "square")
         following = [axis for axis, torque in torques.items() if torque.waveform in _FOLLOWS]
         self.sensors = tuple(f"rate_{axis}" for axis in following)
@@ -158,7 +159,11 @@ class Disturbance:
         span = t1 - t0
         value, rate = [], []
         early, late = t0 + (0.5 - _GAUSS) * span, t0 + (0.5 + _GAUSS) * span
-        for torque in self._calls:
+        for torque, steady in zip(self._calls, self._steady, strict=True):
+            if steady:  # between its edges; one within rounding must not be seen as a slope
+                value.append(torque(t0 + 0.5 * span))
+                rate.append(0.0)
+                continue
             a, b = torque(early), torque(late)
             slope = (b - a) / (2 * _GAUSS * span)
             value.append((a + b - slope * span) / 2)

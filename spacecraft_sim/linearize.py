@@ -173,10 +173,10 @@ def _refuse_nonlinear(model: mujoco.MjModel) -> None:
 
 def _dof_stiffness(model: mujoco.MjModel) -> Array:
     per_dof = np.zeros(model.nv)
-    width = {mujoco.mjtJoint.mjJNT_FREE: 6, mujoco.mjtJoint.mjJNT_BALL: 3}
+    width = {int(mujoco.mjtJoint.mjJNT_FREE): 6, int(mujoco.mjtJoint.mjJNT_BALL): 3}
     for j in range(model.njnt):
         start = model.jnt_dofadr[j]
-        per_dof[start : start + width.get(model.jnt_type[j], 1)] = model.jnt_stiffness[j]
+        per_dof[start : start + width.get(int(model.jnt_type[j]), 1)] = model.jnt_stiffness[j]
     return per_dof
 
 

@@ -7,20 +7,30 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from spacecraft_sim.chart import Charts, Line, Map, Portrait, portraits, pulses, worst_to_come
+from spacecraft_sim.chart import (
+    Charts,
+    Line,
+    Map,
+    Portrait,
+    Region,
+    portraits,
+    pulses,
+    worst_to_come,
+)
 from spacecraft_sim.plots import BAD, DPI, GOOD, INK, MINUS, PLUS, SOFT, panel, prefix
 from spacecraft_sim.trajectory import Trajectory
 
 Array = np.ndarray
 
 LOOKS = {
-    "bound": {"color": GOOD, "linewidth": 2.2},
+    "bound": {"color": GOOD, "linewidth": 3.4},
     "switching": {"color": "#7a3fb5", "linewidth": 1.6, "linestyle": "--"},
     "aid": {"color": SOFT, "linewidth": 0.9},
 }
-REGIONS = ("#ffd9a8", "#cfe3ff", "#e6dcf7", "#d9f2df")
+REGIONS = ("#ffca85", "#8fbcf5", "#bda7e8", "#93d6a6")
 FLIGHT = "#1f6fd6"
 
 
@@ -59,24 +69,43 @@ def _portrait(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
     """Regions, lines, the flight; the flight is wide and red where the thruster may not stop."""
     x, y = (measured[name] for name in portrait.signals)
     (sx, px), (sy, py) = _scales(portrait, x, y)
-    for region, color in zip(portrait.regions, REGIONS, strict=False):
-        axes.fill(*(region.outline / (sx, sy)).T, color=color, alpha=0.8, linewidth=0,
-                  label=region.name, zorder=1)  # fmt: skip
+    _regions(axes, portrait.regions, (sx, sy))
     _lines(axes, portrait.lines, (sx, sy))
-    points = np.stack([x / sx, y / sy], axis=1)
-    axes.plot(*points.T, color=FLIGHT, linewidth=1.0, label="flight", zorder=4)
+    pieces = _smooth(measured.time, x, y) / (sx, sy)
+    look = {"color": FLIGHT, "linewidth": 1.0, "label": "flight", "zorder": 4}
+    axes.add_collection(LineCollection(list(pieces), **look))
     if portrait.min_on_time:
         locked = _locked(measured, portrait)
-        pairs = np.stack([points[:-1], points[1:]], axis=1)[locked[:-1]]
-        axes.add_collection(LineCollection(list(pairs), color=BAD, linewidth=2.0, zorder=5,
-                                           label="minimum on-time running"))  # fmt: skip
-    axes.plot(*points[0], "o", color=INK, markersize=5, label="start", zorder=6)
+        look = {"color": BAD, "linewidth": 1.8, "label": "minimum on-time running", "zorder": 5}
+        axes.add_collection(LineCollection(list(pieces[locked[:-1]]), **look))
+    axes.plot(x[0] / sx, y[0] / sy, "o", color=INK, markersize=5, label="start", zorder=6)
     half = [_half_width(portrait, k) / (sx, sy)[k] for k in (0, 1)]
     axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]))
-    quantities = [name.replace("_", " ") for name in portrait.signals]
-    units = (f"{px}{measured.units[portrait.signals[0]]}",
-             f"{py}{measured.units[portrait.signals[1]]}")  # fmt: skip
-    panel(axes, portrait.title, *(f"{q}, {u}" for q, u in zip(quantities, units, strict=True)))
+    labels = [
+        f"{name.replace('_', ' ')}, {letter}{measured.units[name]}"
+        for name, letter in zip(portrait.signals, (px, py), strict=True)
+    ]
+    panel(axes, portrait.title, labels[0], labels[1])
+
+
+def _smooth(time: Array, x: Array, v: Array) -> Array:
+    """The path of x and its rate v between the rows, shape (rows - 1, 9, 2): v linear, x cubic."""
+    s = np.linspace(0, 1, 9)
+    span, (x0, x1), (v0, v1) = np.diff(time)[:, None], _ends(x), _ends(v)
+    cubic = (1 + 2 * s) * (1 - s) ** 2 * x0 + s**2 * (3 - 2 * s) * x1
+    cubic += span * (s * (1 - s) ** 2 * v0 - s**2 * (1 - s) * v1)
+    return np.stack([cubic, v0 + s * (v1 - v0)], axis=2)
+
+
+def _ends(values: Array) -> tuple[Array, Array]:
+    return values[:-1, None], values[1:, None]
+
+
+def _regions(axes: Axes, regions: Sequence[Region], scales: tuple[float, float]) -> None:
+    """Shaded in turn; they may overlap, so each has a hatching of its own."""
+    for region, color, hatch in zip(regions, REGIONS, ("", "//", "..", "xx"), strict=False):
+        look = {"facecolor": (*to_rgb(color), 0.5), "edgecolor": color, "hatch": hatch}
+        axes.fill(*(region.outline / scales).T, label=region.name, linewidth=0.8, zorder=1, **look)
 
 
 def _scales(portrait: Portrait, x: Array, y: Array) -> tuple[tuple[float, str], tuple[float, str]]:
@@ -146,8 +175,7 @@ def _pulses(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
 
 
 def _map(axes: Axes, chart: Map) -> None:
-    for region, color in zip(chart.regions, REGIONS, strict=False):
-        axes.fill(*region.outline.T, color=color, alpha=0.9, linewidth=0, label=region.name)
+    _regions(axes, chart.regions, (1.0, 1.0))
     looks = ("-", "--", "-.", ":")
     for line, dashes in zip(chart.lines, looks * len(chart.lines), strict=False):
         axes.plot(*line.points.T, color=INK, linewidth=1.2, linestyle=dashes, label=line.name)
