@@ -8,6 +8,8 @@ from spacecraft_sim.spacecraft import Thruster
 from spacecraft_sim.thrusters import Thrusters
 
 Axis = Literal["x", "y", "z"]
+Ways = Literal["both", "positive", "negative"]
+SIGNS: dict[Ways, tuple[int, ...]] = {"both": (-1, 1), "positive": (1,), "negative": (-1,)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ B. Wie, "Space Vehicle Dynamics and Control" (AIAA, 2008), section 7.4.  Nothing
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from controllers.axis import Axis, channel
+from controllers.axis import SIGNS, Axis, Ways, channel
 from spacecraft_sim.checks import positive
 from spacecraft_sim.guarantee import Guarantee
 from spacecraft_sim.reduced import ReducedModel
@@ -25,6 +25,7 @@ class TwoPulse:
         dead_band: Half-width of the dead band, rad.
         drift: Rate at which it is crossed, rad/s.
         level: Thrust, N or N m.
+        signs: Signs that the thrust may have.
         sensors: Angle and rate.
         thrusters: The channel.
         period: None: a law in continuous time.
@@ -33,6 +34,7 @@ class TwoPulse:
     dead_band: float
     drift: float
     level: float
+    signs: tuple[int, ...]
     sensors: tuple[str, ...]
     thrusters: tuple[str, ...]
     period: None = None
@@ -52,9 +54,9 @@ class TwoPulse:
         x, v = y
         if memory and memory * v >= self.drift:
             memory = 0
-        for side in (1, -1):
-            if side * x >= self.dead_band and side * v > -self.drift:
-                memory = -side
+        for sign in self.signs:
+            if -sign * x >= self.dead_band and sign * v < self.drift:
+                memory = sign
         return (memory * self.level,), memory
 
     def events(self, t: float, y: Sequence[float], memory: int) -> tuple[float, ...]:
@@ -68,7 +70,7 @@ class TwoPulse:
         x, v = y
         if memory:
             return (self.drift - memory * v,)
-        return tuple(max(self.dead_band - side * x, -self.drift - side * v) for side in (1, -1))
+        return tuple(max(self.dead_band + s * x, s * v - self.drift) for s in self.signs)
 
 
 def design(
@@ -78,6 +80,7 @@ def design(
     dead_band: float,
     drift: float,
     level: float | None = None,
+    ways: Ways = "both",
     axis: Axis = "z",
 ) -> tuple[TwoPulse, tuple[Guarantee, ...]]:
     """Designs two-pulse phase-plane logic; nothing is guaranteed of it.
@@ -88,6 +91,7 @@ def design(
         dead_band: Half-width of the dead band, rad.
         drift: Rate at which the dead band is crossed, rad/s.
         level: Thrust, N or N m; the thruster's highest if left out, 1 if there is no thruster.
+        ways: Which way the thruster may push: against a steady torque one way is enough.
         axis: The axis.
 
     Returns:
@@ -103,6 +107,7 @@ def design(
         dead_band=dead_band,
         drift=drift,
         level=highest if level is None else level,
+        signs=SIGNS[ways],
         sensors=found.sensors,
         thrusters=(found.thruster,),
     )

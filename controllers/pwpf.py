@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from controllers.axis import Axis, channel
+from controllers.axis import SIGNS, Axis, Ways, channel
 from spacecraft_sim.checks import positive
 from spacecraft_sim.guarantee import Guarantee
 from spacecraft_sim.reduced import ReducedModel
@@ -39,6 +39,7 @@ class Modulator:
         on: |f| at which the thruster switches on.
         off: |f| at which it switches off.
         level: Thrust, N or N m.
+        signs: Signs that the thrust may have.
         period: Sampling period, s.
         sensors: Angle and rate.
         thrusters: The channel.
@@ -51,6 +52,7 @@ class Modulator:
     on: float
     off: float
     level: float
+    signs: tuple[int, ...]
     period: float
     sensors: tuple[str, ...]
     thrusters: tuple[str, ...]
@@ -73,8 +75,9 @@ class Modulator:
         sign = memory.sign
         if sign and sign * lag <= self.off:
             sign = 0
-        if abs(lag) >= self.on:
-            sign = 1 if lag > 0 else -1
+        for way in self.signs:
+            if way * lag >= self.on:
+                sign = way
         return (sign * self.level,), Memory(lag, sign)
 
     def events(self, t: float, y: Sequence[float], memory: Memory) -> tuple[float, ...]:
@@ -99,6 +102,7 @@ def design(
     on: float = 0.45,
     off: float = 0.15,
     period: float = 0.02,
+    ways: Ways = "both",
     axis: Axis = "z",
 ) -> tuple[Modulator, tuple[Guarantee, ...]]:
     """Designs PD feedback through a PWPF modulator; nothing is guaranteed of it.
@@ -113,6 +117,7 @@ def design(
         on: Output of the lag, over the thrust, at which the thruster switches on.
         off: Output at which it switches off.
         period: Sampling period, s.
+        ways: Which way the thruster may push: against a steady torque one way is enough.
         axis: The axis.
 
     Returns:
@@ -136,6 +141,7 @@ def design(
         on=on,
         off=off,
         level=level,
+        signs=SIGNS[ways],
         period=period,
         sensors=found.sensors,
         thrusters=(found.thruster,),

@@ -10,7 +10,7 @@ guaranteed.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from controllers.axis import Axis, channel
+from controllers.axis import SIGNS, Axis, Ways, channel
 from spacecraft_sim.checks import positive
 from spacecraft_sim.guarantee import Guarantee
 from spacecraft_sim.reduced import ReducedModel
@@ -26,6 +26,7 @@ class SchmittTrigger:
         on: |s| at which the thruster switches on, rad.
         off: |s| at which it switches off, rad.
         level: Thrust, N or N m.
+        signs: Signs that the thrust may have.
         sensors: Angle and rate.
         thrusters: The channel.
         period: None: a law in continuous time.
@@ -35,6 +36,7 @@ class SchmittTrigger:
     on: float
     off: float
     level: float
+    signs: tuple[int, ...]
     sensors: tuple[str, ...]
     thrusters: tuple[str, ...]
     period: None = None
@@ -54,8 +56,9 @@ class SchmittTrigger:
         s = y[0] + self.lead * y[1]
         if memory and -memory * s <= self.off:
             memory = 0
-        if abs(s) >= self.on:
-            memory = -1 if s > 0 else 1
+        for sign in self.signs:
+            if -sign * s >= self.on:
+                memory = sign
         return (memory * self.level,), memory
 
     def events(self, t: float, y: Sequence[float], memory: int) -> tuple[float, ...]:
@@ -67,7 +70,9 @@ class SchmittTrigger:
             memory: The sign of the thrust.
         """
         s = y[0] + self.lead * y[1]
-        return (-memory * s - self.off,) if memory else (self.on - s, self.on + s)
+        if memory:
+            return (-memory * s - self.off,)
+        return tuple(self.on + sign * s for sign in self.signs)
 
 
 def design(
@@ -78,6 +83,7 @@ def design(
     lead: float,
     hysteresis: float = 0.2,
     level: float | None = None,
+    ways: Ways = "both",
     axis: Axis = "z",
 ) -> tuple[SchmittTrigger, tuple[Guarantee, ...]]:
     """Designs a Schmitt trigger with a dead zone; nothing is guaranteed of it.
@@ -89,6 +95,7 @@ def design(
         lead: T of s = x + T v, s.
         hysteresis: Share of the threshold by which |s| must fall before it switches off.
         level: Thrust, N or N m; the thruster's highest if left out, 1 if there is no thruster.
+        ways: Which way the thruster may push: against a steady torque one way is enough.
         axis: The axis.
 
     Returns:
@@ -107,6 +114,7 @@ def design(
         on=threshold,
         off=threshold * (1 - hysteresis),
         level=highest if level is None else level,
+        signs=SIGNS[ways],
         sensors=found.sensors,
         thrusters=(found.thruster,),
     )

@@ -104,10 +104,24 @@ def test_numbers_that_make_no_regulator_are_refused(design, numbers, words):
         design(**numbers)
 
 
+@pytest.mark.parametrize(
+    ("design", "numbers"),
+    [
+        (schmitt_trigger.design, {"threshold": 0.1, "lead": 2.0}),
+        (phase_plane.design, {"dead_band": 0.1, "drift": 0.06}),
+        (pwpf.design, {"bandwidth": 0.8}),
+    ],
+)
+def test_against_a_steady_torque_one_way_is_enough(design, numbers):
+    track = fly(design(**numbers, ways="negative")[0], torque=0.3, angle=-0.2, rate=0.1)
+    assert set(np.sign(track["thruster_z"])) == {0.0, -1.0}
+    assert np.abs(track["attitude_z"][track.time > 40]).max() < 1.0
+
+
 def test_laws_side_by_side_decide_each_for_itself():
     x, _ = schmitt_trigger.design(threshold=0.1, lead=1.0)
     laws = Channels(laws=(x, phase_plane.TwoPulse(
-        dead_band=0.2, drift=0.1, level=2.0, sensors=("a", "b"), thrusters=("other",)
+        dead_band=0.2, drift=0.1, level=2.0, signs=(-1, 1), sensors=("a", "b"), thrusters=("other",)
     )))  # fmt: skip
     assert laws.sensors == ("attitude_z", "rate_z", "a", "b")
     u, memory = laws.step(0.0, (0.05, 0.0, 0.1, 0.0), laws.init())
