@@ -191,7 +191,7 @@ def _first_time(
         following = _next_time(modes, task.multipliers(near.multipliers), T, bound, x1 - x0, v0, v1)
         # At the end rounding decides; small steps on lead out of it.
         stalled += following < T * (1 + 1e-10)
-        T = max(following, T * (1 + 1e-15 * 2**stalled))
+        T = float(max(following, T * (1 + 1e-15 * 2**stalled)))
     raise ArithmeticError(f"no duration found in {_STEPS} steps; the last was {T} s")
 
 

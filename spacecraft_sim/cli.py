@@ -210,8 +210,12 @@ def _verdict_table(comparison: "Comparison") -> Table:
 
 
 def _difference_line(comparison: "Comparison") -> str:
-    worst = [d for d in comparison.differences if d.signal.startswith(("attitude", "quasi_rigid"))]
-    parts = [f"{d.signal} {d.max_error:.3g} {d.unit}" for d in worst]
+    parts = []
+    for kind in ("attitude", "quasi_rigid_angle", "quasi_rigid_rate"):  # of each the worst axis
+        axes = [d for d in comparison.differences if d.signal.rpartition("_")[0] == kind]
+        if axes:
+            worst = max(axes, key=lambda d: d.max_error)
+            parts.append(f"{worst.signal} {worst.max_error:.3g} {worst.unit}")
     return "MuJoCo minus reduced model, at most: " + ", ".join(parts)
 
 
