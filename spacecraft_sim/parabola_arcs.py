@@ -53,8 +53,8 @@ def feedback(bound: float, signs: Signs) -> Disturbance:
     on = Push(bound * signs.on_up), Push(bound * signs.on_down)
 
     def push(t: float, v: float, level: int, rising: bool, switchings: int) -> Push:
-        down = v < 0 or (v == 0 and not rising)
-        return (on if level < 0 else off)[down]
+        up, down = on if level < 0 else off
+        return down if v < 0 or (v == 0 and not rising) else up
 
     return push
 
@@ -207,7 +207,7 @@ def propagate(
     positive(min_on_time=min_on_time)
     if not (math.isfinite(duration) or switchings < sys.maxsize):
         raise ValueError("a flight needs an end: give duration or switchings")
-    x, v = start
+    x, v = map(float, start)
     if not all(map(math.isfinite, (x, v, bias))):
         raise ValueError(f"start and bias must be finite, got {start}, {bias}")
     lines = {n: relay.lines(n) for n in (-1, 0, 1)}

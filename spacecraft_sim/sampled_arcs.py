@@ -62,7 +62,7 @@ def propagate_sampled(
     """
     positive(period=period, duration=duration)
     positive(on_delay=on_delay, off_delay=off_delay, zero=True)
-    x, v = start
+    x, v = map(float, start)
     t, sample, count = 0.0, 0, 0
     memory, command, level = law.init(), 0, 0
     queue: list[tuple[float, int]] = []
