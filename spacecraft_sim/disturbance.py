@@ -14,12 +14,13 @@ _GAUSS = math.sqrt(3) / 6  # the Gauss nodes of [0, 1] are 1/2 -+ this
 _RESOLVED = 0.25  # rad of phase a line may span: its mean is then exact to 0.25^4/4320 = 1e-6
 
 
-# Sign of the torque over the sign of the rate: while the axis' thruster is off, and while it is on.
+# Signs of a torque beside a positive constant: thruster off and rate up, off and down, on and up,
+# on and down.  Beside a negative constant all is mirrored.
 _FOLLOWS = {
-    "with_rate": (1.0, 1.0),  # (3.2)
-    "against_rate": (-1.0, -1.0),  # (3.3)
-    "with_rate_when_off": (1.0, -1.0),  # (3.6)
-    "against_rate_when_off": (-1.0, 1.0),  # (3.7)
+    "with_rate": (1, -1, 1, -1),  # (3.2)
+    "against_rate": (-1, 1, -1, 1),  # (3.3)
+    "leftmost": (1, -1, -1, -1),  # (3.6), the furthest against the constant
+    "rightmost": (-1, 1, 1, -1),  # (3.7), the furthest along with it
 }
 
 
@@ -30,9 +31,9 @@ class Torque(Model):
     amplitude: float = quantity("amplitude of the periodic part", "N m", 0.0)
     frequency: float = quantity("angular frequency of the periodic part", "rad/s", 0.0)
     phase: float = quantity("phase of the periodic part", "rad", 0.0)
-    waveform: Literal[
-        "sine", "square", "with_rate", "against_rate", "with_rate_when_off", "against_rate_when_off"
-    ] = quantity("w, a sine, its sign, or plus or minus the sign of the axis' rate", "", "sine")
+    waveform: Literal["sine", "square", "with_rate", "against_rate", "leftmost", "rightmost"] = (
+        quantity("w: a sine, its sign, or a sign that follows rate and thrust", "", "sine")
+    )
 
     def __call__(self, t: float) -> float:
         """Returns the torque at `t`, N m, less the part that follows the motion."""
@@ -85,17 +86,29 @@ class Disturbance:
         following = [axis for axis, torque in torques.items() if torque.waveform in _FOLLOWS]
         self.sensors = tuple(f"rate_{axis}" for axis in following)
         self._following = tuple(
-            (list(torques).index(axis), f"_{axis}", torques[axis].amplitude, *_FOLLOWS[waveform])
+            (
+                list(torques).index(axis),
+                f"_{axis}",
+                math.copysign(torques[axis].amplitude, torques[axis].constant),
+                math.copysign(1.0, torques[axis].constant),
+                _FOLLOWS[torques[axis].waveform],
+            )
             for axis in following
-            if (waveform := torques[axis].waveform)
         )
         smooth = [t for t in self._torques if t.amplitude and t.waveform == "sine"]
         fastest = max((abs(t.frequency) for t in smooth), default=0.0)
         self.longest = _RESOLVED / fastest if fastest else math.inf
 
-    def init(self) -> Ways:
-        """Returns the signs of the rates before they were read."""
-        return (1.0,) * len(self.sensors)
+    def init(self, rates: Sequence[float]) -> Ways:
+        """Returns the signs of the rates at the start; from rest that of the constant part.
+
+        Args:
+            rates: Readings, in the order of `sensors`, rad/s.
+        """
+        return tuple(
+            math.copysign(1.0, rate or mirror)
+            for rate, (_, _, _, mirror, _) in zip(rates, self._following, strict=True)
+        )
 
     def events(self, rates: Sequence[float], ways: Ways) -> list[float]:
         """Returns functions that are positive while each rate keeps its sign.
@@ -123,9 +136,9 @@ class Disturbance:
             thrust: Present thrust by channel; one whose name ends in `_<axis>` acts on that axis.
         """
         push = [0.0] * len(self.names)
-        for way, (k, axis, amplitude, off, on) in zip(ways, self._following, strict=True):
+        for way, (k, axis, size, mirror, signs) in zip(ways, self._following, strict=True):
             firing = any(level for name, level in thrust.items() if name.endswith(axis))
-            push[k] = amplitude * way * (on if firing else off)
+            push[k] = size * signs[2 * firing + (way * mirror < 0)]
         return push
 
     def value(self, t: float) -> list[float]:

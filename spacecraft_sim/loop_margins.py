@@ -69,41 +69,53 @@ class Loop:
         washout = s[:, None] / (s[:, None] + np.array(self.filter.cutoffs))
         return (self.direct + (self.damping * washout[:, None, :]) @ self.filtered) @ plant
 
-    def sampled_matrix(self, period: float, *, late: int = 0) -> Array:
+    def sampled_matrix(self, period: float | Array, *, late: int = 0) -> Array:
         """Returns the matrix that takes the sampled loop from one sample to the next.
 
         Args:
-            period: T, s.
+            period: T, or several of them, s.
             late: Samples by which the torques come late.
+
+        Returns:
+            The matrix, over plant, filter and the torques under way, shape (..., m, m).
         """
         from scipy.linalg import expm
 
+        T = np.asarray(period, dtype=float)
         n, nu = self.B.shape
-        both = expm(period * np.block([[self.A, self.B], [np.zeros((nu, n + nu))]]))
-        a, b = (np.diag(c) for c in self.filter.coefficients(period))
+        plant = np.zeros((n + nu, n + nu))
+        plant[:n] = np.hstack([self.A, self.B])
+        both = expm(T[..., None, None] * plant)
+        pairs = [self.filter.coefficients(x) for x in T.ravel().tolist()]
+        a, b = (np.array([pair[k] for pair in pairs]).reshape(*T.shape, -1) for k in (0, 1))
         # With v = w - b z, memory of the filter: w = v + b z, v+ = a w - b z.
-        Z = self.filtered @ self.C
-        u = np.hstack([self.direct @ self.C + self.damping @ b @ Z, self.damping])
-        x = np.hstack([both[:n, :n], np.zeros((n, len(a)))])
-        v = np.hstack([(a - np.eye(len(a))) @ b @ Z, a])
+        Z, nz = self.filtered @ self.C, a.shape[-1]
+        torques = self.direct @ self.C + (self.damping * b[..., None, :]) @ Z  # by x
+        x, v, m = slice(0, n), slice(n, n + nz), n + nz + late * nu
+        M = np.zeros((*T.shape, m, m))
+        M[..., x, x] = both[..., :n, :n]
+        M[..., v, x] = ((a - 1) * b)[..., None] * Z
+        M[..., v, v] = a[..., None] * np.eye(nz)
+        # The torques under way stand last, the next to act first.
+        held = both[..., :n, n:]
         if late == 0:
-            return np.vstack([x + both[:n, n:] @ u, v])
-        # The torques under way, the next to act first.
-        waiting = np.eye(late * nu)
-        rest = np.zeros((n + len(a), late * nu))
-        rest[:n, :nu] = both[:n, n:]
-        newest = np.vstack([np.zeros(((late - 1) * nu, u.shape[1])), u])
-        moved = np.vstack([waiting[nu:], np.zeros((nu, late * nu))])
-        return np.block([[np.vstack([x, v]), rest], [newest, moved]])
+            M[..., x, x] += held @ torques
+            M[..., x, v] = held @ self.damping
+        else:
+            M[..., x, n + nz : n + nz + nu] = held
+            M[..., m - nu :, x], M[..., m - nu :, v] = torques, self.damping
+            M[..., n + nz : m - nu, n + nz + nu :] = np.eye((late - 1) * nu)
+        return M
 
-    def spectral_radius(self, period: float, *, late: int = 0) -> float:
-        """Returns the largest |eigenvalue| of the sampled loop.
+    def growth(self, period: float | Array, *, late: int = 0) -> Array:
+        """Returns the growth rate of the sampled loop, negative if it is stable, 1/s.
 
         Args:
-            period: T, s.
+            period: T, or several of them, s.
             late: Samples by which the torques come late.
         """
-        return float(np.max(np.abs(np.linalg.eigvals(self.sampled_matrix(period, late=late)))))
+        roots = np.linalg.eigvals(self.sampled_matrix(period, late=late))
+        return np.log(np.max(np.abs(roots), axis=-1)) / period
 
 
 def close(law: FilteredLaw, plant: LinearPlant, *, t: float = 0.0) -> Loop:
@@ -184,24 +196,25 @@ def longest_period(loop: Loop, *, upper: float, late: int = 0) -> float:
     positive(upper=upper)
     values = _require_stable(loop)
 
-    def growth(T: float) -> float:  # per second
-        return math.log(loop.spectral_radius(T, late=late)) / T
+    def growth(T: float) -> float:
+        return float(loop.growth(T, late=late))
 
-    shortest = min(1e-2 / float(np.max(np.abs(values))), upper / 2)
-    grid = np.geomspace(shortest, upper, 1 + math.ceil(math.log(upper / shortest) / _RATIO))
-    T, rates = grid.tolist(), [growth(grid[0])]
-    if rates[0] > 0:
-        raise ValueError(f"the sampled loop is not stable even at T = {shortest:.3g} s")
-    for k in range(1, len(T)):
-        rates.append(growth(T[k]))
-        unstable = T[k] if rates[k] > 0 else None
-        if k > 1 and rates[k - 2] < rates[k - 1] > rates[k]:
-            # The peak may be higher than the three periods show.
-            peak = _extreme(growth, T[k - 2], T[k], highest=True)
-            unstable = peak if growth(peak) > 0 else unstable
-        if unstable is not None:
-            stable = T[k - 2] if unstable < T[k] else T[k - 1]
-            return float(brentq(growth, stable, unstable, rtol=1e-10))  # pyright: ignore
+    shortest = min(_FIRST / float(np.max(np.abs(values))), upper / 2)
+    T = np.geomspace(shortest, upper, 1 + math.ceil(math.log(upper / shortest) / _RATIO))
+    rates = np.empty(0)
+    for start in range(0, len(T), _BATCH):
+        rates = np.append(rates, loop.growth(T[start : start + _BATCH], late=late))
+        if rates[0] > 0:
+            raise ValueError(f"the sampled loop is not stable even at T = {shortest:.3g} s")
+        for k in range(max(start, 1), len(rates)):
+            unstable = float(T[k]) if rates[k] > 0 else math.inf
+            if k > 1 and rates[k - 2] < rates[k - 1] > rates[k]:
+                # The peak may be higher than the three periods show.
+                peak = _extreme(growth, T[k - 2], T[k], highest=True)
+                unstable = min(unstable, peak) if growth(peak) > 0 else unstable
+            if unstable < math.inf:
+                stable = T[k - 1] if unstable >= T[k] else T[k - 2]
+                return float(brentq(growth, stable, unstable, rtol=1e-10))  # pyright: ignore
     return math.inf
 
 
@@ -225,6 +238,8 @@ def _extreme(
     return float(fminbound(lambda x: sign * function(x), low, high, xtol=1e-7 * high))  # pyright: ignore
 
 
+_FIRST = 0.02  # first period looked at, over the fastest time constant
+_BATCH = 100  # periods looked at together
 _RATIO = 5e-3  # between neighbouring periods looked at: 0.25 ms at 50 ms; peaks are refined
 _PER_DECADE = 300  # frequencies looked at, beside those near the poles
 

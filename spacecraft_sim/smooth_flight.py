@@ -20,6 +20,7 @@ from spacecraft_sim.trajectory import Trajectory
 Array = np.ndarray
 Disturbance = Callable[[float], Sequence[float]]  # time, s -> torque on every input
 _RTOL, _ATOL = 1e-10, 1e-12
+_TINY = 1e-9  # of a period
 
 
 def fly(
@@ -60,7 +61,7 @@ def fly(
     memories: list[Any] = [law.init() for _ in range(m)]
     command = torque = np.zeros((m, len(dynamics.inputs)))
     ceiling = math.inf if limits is None else np.asarray(limits, dtype=float)
-    samples = math.floor(duration / law.period * (1 + 1e-12))
+    samples = math.floor(duration / law.period + _TINY)
     rows: list[tuple[float, Array, Array, Array]] = []
 
     def rates(t: float, flat: Array) -> Array:
@@ -76,11 +77,12 @@ def fly(
         end = min((k + 1) * law.period, duration)
         if k % every == 0 or k == samples:
             rows.append((t, x, command, torque))
-        if end <= t:
+        if end - t <= _TINY * law.period:  # but for the rounding of the clock this is the end
             break
         solver = DOP853(rates, t, x.ravel(), end, first_step=end - t, rtol=_RTOL, atol=_ATOL)
-        while solver.status == "running":
-            solver.step()
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is told below
+            while solver.status == "running":
+                solver.step()
         if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
             raise ArithmeticError(f"the motion cannot be integrated beyond t = {solver.t:.6g} s")
         x = solver.y.reshape(shape)

@@ -75,7 +75,8 @@ class ControlTask(control.Task):
             tuple(name for name in physics.units if name.startswith("attitude_"))
         )
         self._rates = physics.select(self._disturbance.sensors)
-        self._memory, self._ways = self._controller.init(), self._disturbance.init()
+        self._memory = self._controller.init()
+        self._ways = self._disturbance.init(self._rates())
         self._state = self._thrusters.init()
         self._extra = [0.0] * len(self._thrusters.names)
         self._command = [0.0] * len(self._thrusters.names)
@@ -176,15 +177,17 @@ class ControlTask(control.Task):
                 stop, switched = self._switching(physics, stop)
             if self.recorder:
                 self._accumulate(value, rates, stop - t)
-            t, landed = stop, stop in (self._edge, jump)
+            t, landed, before = stop, stop in (self._edge, jump), (self._thrust, self._push)
             if switched or stop == sample:
                 self._switch(t, sampled=stop == sample)
             elif landed or any(self._slope):
                 self._follow_thrust(t)
             if switched or landed or stop == sample:
                 self._trace = self._trace[-1:]
-                # From a zero of its own the event function can only come back once, which shows.
-                self._unknown_slope = landed and self._located
+                # Under the same thrust as before, from a zero of its own, the event function can
+                # only come back once, which shows.
+                jumped = landed or before != (self._thrust, self._push)
+                self._unknown_slope = jumped and self._located
                 self._record(physics)
         self._record(physics)
 

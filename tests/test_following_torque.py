@@ -18,10 +18,11 @@ F, E = 0.5, 0.2  # steady torque and the one that follows, N m, on 1 kg m^2
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Pulse:
-    """One pulse of -1 N m between two instants."""
+    """One pulse between two instants."""
 
     start: float
     end: float
+    level: float = -1.0
     period: float | None = None
     sensors: tuple[str, ...] = ()
     thrusters: tuple[str, ...] = ("thruster_z",)
@@ -30,19 +31,19 @@ class Pulse:
         return ()
 
     def step(self, t, y, memory):
-        return (-1.0 if self.start <= t < self.end else 0.0,), (t,)
+        return (self.level if self.start <= t < self.end else 0.0,), (t,)
 
     def events(self, t, y, memory):
         return tuple(x - t for x in (self.start, self.end) if x > memory[0])
 
 
-def flight(waveform, law, *, rate, duration=5.0):
+def flight(waveform, law, *, rate, duration=5.0, constant=F):
     model = double_integrator()
     task = ControlTask(
         law,
         Thrusters([Thruster(name="thruster_z", levels=(1.0,), min_on_time=0.1)]),
         initial=Initial(rate=(0.0, 0.0, rate)),
-        disturbance=Disturbance({"z": Torque(constant=F, amplitude=E, waveform=waveform)}),
+        disturbance=Disturbance({"z": Torque(constant=constant, amplitude=E, waveform=waveform)}),
     )
     plant = ReducedPhysics(model, start=galerkin_start(0), timestep=0.1)
     return simulate(Environment(plant, task, duration=duration, substeps=1), meta={})
@@ -68,18 +69,21 @@ def test_a_torque_that_follows_the_rate_turns_over_where_the_rate_does(waveform,
     np.testing.assert_allclose(track["disturbance_z"][t > turn + 1e-10], fast, atol=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("waveform", "off", "on"), [("with_rate_when_off", 1, -1), ("against_rate_when_off", -1, 1)]
-)
-def test_a_torque_may_follow_the_rate_one_way_while_off_and_the_other_while_on(waveform, off, on):
-    track = flight(waveform, Pulse(start=0.35, end=1.05), rate=2.0, duration=2.0)
+@pytest.mark.parametrize("mirror", [1, -1])
+@pytest.mark.parametrize("rate", [2.0, -4.0])
+@pytest.mark.parametrize(("waveform", "off", "on"), [("leftmost", 1, -1), ("rightmost", -1, 1)])
+def test_a_torque_may_tell_a_thruster_that_is_on(waveform, off, on, rate, mirror):
+    pulse = Pulse(start=0.35, end=1.05, level=-mirror)
+    track = flight(waveform, pulse, rate=mirror * rate, duration=2.0, constant=mirror * F)
     firing = track["thruster_z"] != 0
     assert firing.sum() > 5
-    assert (track["rate_z"] > 0).all()
-    np.testing.assert_allclose(track["disturbance_z"], F + E * np.where(firing, on, off))
-    lost = 0.7 * (1 - F - on * E)
-    gained = 1.3 * (F + off * E)
-    assert track["rate_z"][-1] == pytest.approx(2.0 + gained - lost, abs=1e-12)  # roundings
+    side = np.sign(rate)
+    assert (mirror * side * track["rate_z"] > 0).all()
+    when_on = -1 if waveform == "leftmost" else on * side  # (3.6) has no sign of v there
+    torque = F + E * np.where(firing, when_on, off * side)
+    np.testing.assert_allclose(track["disturbance_z"], mirror * torque)
+    change = 1.3 * (F + off * side * E) + 0.7 * (F + when_on * E - 1)
+    assert track["rate_z"][-1] == pytest.approx(mirror * (rate + change), abs=1e-12)  # roundings
 
 
 def test_from_rest_the_torque_follows_where_the_rate_goes():

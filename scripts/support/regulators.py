@@ -81,7 +81,7 @@ def disturbances(F: float, e: float, turn: float) -> dict[str, dict[str, Any]]:
         e: Bound of the rest, N m.
         turn: Time in which a limit cycle turns, s; the square waves are in step with it.
     """
-    following = ("with_rate", "against_rate", "with_rate_when_off", "against_rate_when_off")
+    following = ("with_rate", "against_rate", "leftmost", "rightmost")
     found = {name: {"constant": F, "amplitude": e, "waveform": name} for name in following}
     found |= {"F + e": {"constant": F + e}, "F - e": {"constant": F - e}}
     for k in (1, 2, 3):
