@@ -21,10 +21,11 @@ def main(argv: list[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--duration", type=float, default=300.0, help="of each flight, s")
+    parser.add_argument("--short", action="store_true", help="do not tune the usual ones")
     arguments = parser.parse_args(argv)
     print(HEAD)
     p0 = 0.0
-    for row, disturbance in regulators.flown(arguments.duration):
+    for row, disturbance in regulators.flown(arguments.duration, tune=not arguments.short):
         p0 = p0 or row.worst
         print(
             f"{row.name:40s} {row.worst:9.3e} rad {row.worst / p0:9.4f} {row.firings:10.0f}"

@@ -16,6 +16,8 @@ SCRIPTS = [p for p in sorted(FOLDER.glob("*.py")) if "def main(" in p.read_text(
 # Small arguments, by script; a script that is not here is run as it stands.
 ARGUMENTS = {
     "benchmark": ["--rounds", "1", "--span", "0.2", "--duration", "2.0"],
+    "manoeuvres": ["--short", "--out", "manoeuvres.png"],
+    "regulators": ["--short", "--duration", "20.0"],
     "reproduce": ["efremov", "--duration", "5.0", "--out", "figures"],
 }
 
