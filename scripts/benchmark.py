@@ -6,7 +6,7 @@ Times of one machine say little; the ratios carry over.
 import argparse
 import sys
 
-from support import flight_cost, relay_cost
+from support import flight_cost, plan_cost, relay_cost
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -23,6 +23,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     flight_cost.controlled_step(span=arguments.span, rounds=arguments.rounds)
     flight_cost.whole_run(duration=arguments.duration, rounds=min(arguments.rounds, 3))
+    plan_cost.beside_cvxpy(rounds=min(arguments.rounds, 3))
     relay_cost.beside_rivals(rounds=min(arguments.rounds, 3))
     relay_cost.growth(longest=arguments.longest)
     return 0
