@@ -16,7 +16,6 @@ from controllers.plans import read_only
 
 _GAP = 1e-11  # between the impulses and the bound that l proves, relative
 _ROUNDS = 10  # of refining the grid of the linear program
-_NEAR = 0.03  # two impulses of one sign this close, in durations, may stand for one between
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,13 +73,14 @@ def impulse_limit(
     gap = np.inf
     for _ in range(_ROUNDS):
         rough = _on_grid(problem, nodes)
-        for s, impulses, lam in (rough, _newton(problem, *_merged(*rough))):
+        exact = [_newton(problem, *guess) for guess in (rough, _merged(nodes, *rough))]
+        for s, impulses, lam in (rough, *exact):
             turns = _extremes(problem, lam)
             highest = float(np.max(np.abs(lam @ problem.functions(turns))))
             fuel, lower = float(np.abs(impulses).sum()), float(lam @ problem.target) / highest
             gap = abs(fuel / lower - 1)
             found = _limit(problem, s, impulses, lam / highest)
-            if gap < _GAP and found.residual < _GAP and s[0] >= 0 and s[-1] <= 1:
+            if gap < _GAP and found.residual < _GAP:
                 return found
             nodes = np.union1d(nodes, turns)
     raise ArithmeticError(f"impulses and their bound stay {gap:.1e} apart; {_GAP} is asked for")
@@ -101,11 +101,11 @@ def _on_grid(problem: Problem, nodes: Array) -> tuple[Array, Array, Array]:
     return nodes[used], impulses[used], lam
 
 
-def _merged(s: Array, impulses: Array, lam: Array) -> tuple[Array, Array, Array]:
-    """Neighbours of one sign as one impulse between them."""
-    groups = np.cumsum(
-        np.concatenate([[0], (np.diff(np.sign(impulses)) != 0) | (np.diff(s) > _NEAR)])
-    )
+def _merged(nodes: Array, s: Array, impulses: Array, lam: Array) -> tuple[Array, Array, Array]:
+    """Impulses of one sign at neighbouring nodes as one between them."""
+    neighbours = np.diff(np.searchsorted(nodes, s)) == 1
+    apart = ~neighbours | (np.diff(np.sign(impulses)) != 0)
+    groups = np.concatenate([[0], np.cumsum(apart)])
     sums = np.bincount(groups, impulses)
     return np.bincount(groups, impulses * s) / sums, sums, lam
 
@@ -127,6 +127,8 @@ def _newton(problem: Problem, s: Array, impulses: Array, lam: Array) -> tuple[Ar
             [problem.excess(s, impulses), lam @ q - signs, np.where(inner, lam @ slopes, 0.0)]
         )
         x = np.linalg.lstsq(J, -error, rcond=1e-13)[0]
+        if np.any(np.abs(s + x[:k] - 0.5) > 0.5):
+            break
         s, impulses, lam = s + x[:k], impulses + x[k : 2 * k], lam + x[2 * k :]
     return s, impulses, lam
 

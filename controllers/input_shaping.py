@@ -25,7 +25,7 @@ from functools import reduce
 
 import numpy as np
 
-from controllers.moments import Array, Modes, Numbers, modes_of, share, targets
+from controllers.moments import Array, Modes, Numbers, finite, modes_of, share, targets
 from controllers.plans import SwitchedPlan, read_only
 from spacecraft_sim.checks import positive
 
@@ -247,6 +247,7 @@ def _shaped(
     bound: float | None,
 ) -> SwitchedPlan:
     """The plan of a bang-bang command through shapers; residuals speak of these modes."""
+    finite(x0=x0, x1=x1)
     shaper = reduce(Shaper.convolved, shapers, NONE)
     length, way = shaper.length, x1 - x0
     if (duration is None) == (bound is None):

@@ -137,15 +137,17 @@ def worst_turn(relay: Relay, c: Contour, *, excess: float, flips: int = 4) -> Wo
     best = _Best()
 
     def run(disturbance: Disturbance, words: str) -> float:
-        flight = propagate(
-            relay,
-            start=(-(1 + excess) * c.p, 0.0),
-            bias=c.F,
-            disturbance=disturbance,
-            switchings=3,
-        )
-        left = -float(flight.peaks[1]) / c.p - 1
-        return best.offer(left / excess, words)
+        peaks, switchings = [], 3
+        while len(peaks) < 2:  # far out Example 2 takes several pulses to turn
+            flight = propagate(
+                relay,
+                start=(-(1 + excess) * c.p, 0.0),
+                bias=c.F,
+                disturbance=disturbance,
+                switchings=switchings,
+            )
+            peaks, switchings = flight.peaks.tolist(), 4 * switchings
+        return best.offer((-peaks[1] / c.p - 1) / excess, words)
 
     ranked = sorted(FEEDBACKS, key=lambda s: -run(feedback(c.eps, s), f"feedback {tuple(s)}"))
     for signs in ranked[:flips]:

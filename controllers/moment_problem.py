@@ -241,7 +241,11 @@ def crossings(
         thresholds: Ascending.
         values: What is returned for pieces below, between and above them.
         end: End of the interval, which starts at 0.
+
+    Raises:
+        ArithmeticError: If there are so many that they must be rounding errors about a threshold.
     """
+    most = 100 + 4 * sum(abs(mu) for mu, _ in curve.waves) * end
     limits = (-np.inf, *thresholds, np.inf)
     s, cell = 0.0, bisect_right(thresholds, curve(0.0)[0])
     edges, pieces = [], [values[cell]]
@@ -250,6 +254,12 @@ def crossings(
         cell += 1 if limits[cell + 1] - x < x - limits[cell] else -1
         edges.append(s)
         pieces.append(values[cell])
+        if len(edges) > most:
+            raise ArithmeticError(
+                f"h_l crosses {thresholds} more than {most:.0f} times, which its terms cannot but "
+                "their rounding errors can: omega T is too small, or two modes are too much alike, "
+                "for the moments to differ in double precision"
+            )
     return np.array(edges), np.array(pieces)
 
 

@@ -170,7 +170,7 @@ def switched_plan(
     return SwitchedPlan(
         duration=problem.duration,
         switch_times=read_only(problem.duration * (1 - edges[::-1])),
-        levels=read_only(level * pattern[::-1]),
+        levels=read_only(level * pattern[::-1] + 0.0),  # no negative zero
         residual=problem.error(edges, level / problem.unit * pattern),
         normal=normal,
         multipliers=read_only(problem.multipliers(own)),

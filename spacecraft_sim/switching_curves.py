@@ -163,7 +163,10 @@ class Relay:
             pieces += self.left
         rates = [0.0] if self.guarded else []
         for region in self.regions:
-            pieces += [*region.lower, *region.upper]
+            for piece in (*region.lower, *region.upper):
+                low, high = max(piece.low, region.low), min(piece.high, region.high)
+                if low < high:
+                    pieces.append(piece._replace(low=low, high=high))
             rates += [region.low, region.high]
         return tuple(pieces), tuple(rates)
 

@@ -119,7 +119,7 @@ def test_close_to_the_degenerate_case(sign, exponent):
     T = 4 * math.pi * (1 + sign * 10.0**-exponent)
     plan = min_peak(omega=1.0, damping=0.0, duration=T, x1=1.0)
     assert plan.residual < 2e-11
-    assert plan.peak >= 4 / T**2 * (1 - 1e-14)
+    assert plan.peak >= 4 / T**2 * (1 - 2e-11)  # to the residual
     assert plan.peak == pytest.approx(4 / T**2, rel=10.0**-exponent)
 
 
@@ -139,17 +139,19 @@ def test_a_constant_control_over_a_whole_period():
 # -- bounds close to the least peak, and far -------------------------------------------------------
 
 
-@pytest.mark.parametrize("excess", [1e-11, 1e-9, 1e-7, 1e-5, 1e-4])
 @pytest.mark.parametrize("name", CASES)
-def test_little_more_than_the_least_peak(name, excess):
+def test_little_more_than_the_least_peak(name):
     asked = CASES[name]
     peak = min_peak(**asked)
-    plan = min_fuel(**asked, bound=peak.peak * (1 + excess))
-    assert plan.residual < 1e-11
-    saved = 1 - plan.fuel / peak.fuel
-    # To first order the pauses open as the root of the excess.
-    wide = min_fuel(**asked, bound=peak.peak * (1 + 100 * excess))
-    assert saved == pytest.approx((1 - wide.fuel / peak.fuel) / 10, rel=0.05)
+    saved = []
+    for excess in (1e-11, 4e-11, 1e-9, 4e-9, 1e-7, 4e-7, 1e-5, 1e-4, 1e-3, 1e-2):
+        plan = min_fuel(**asked, bound=peak.peak * (1 + excess))
+        assert plan.residual < 1e-11
+        saved.append(1 - plan.fuel / peak.fuel)
+    assert np.all(np.diff(saved) > 0)
+    # Pauses open as the root of the excess, to first order; there are digits for no more at 1e-11.
+    assert saved[1] == pytest.approx(2 * saved[0], rel=1e-2)
+    assert saved[3] == pytest.approx(2 * saved[2], rel=2e-3)
 
 
 @pytest.mark.parametrize("ratio", [10, 1e2, 1e3])
@@ -161,16 +163,23 @@ def test_much_more_than_the_least_peak(ratio):
     assert 0.315328 < plan.fuel < 0.315669  # impulses, and ten times the least peak
 
 
-@pytest.mark.parametrize("turns", [0.3, 1.0, 3.0, 300.0, 3000.0])
-def test_short_and_long_beside_the_period(turns):
-    plan = min_peak(omega=turns / 7.0, damping=0.02 * turns / 7.0, duration=7.0, x1=1.0)
-    fuel = min_fuel(
-        omega=turns / 7.0, damping=0.02 * turns / 7.0, duration=7.0, x1=1.0, bound=2 * plan.peak
-    )
-    assert max(plan.residual, fuel.residual) < 1e-11
-    slow = 4 / 49 * (1 + 96 / turns**2)  # 2 sin-like pulses of a stiff body on a weak spring
-    assert plan.peak > 4 / 49
-    assert turns > 1 or plan.peak > slow
+@pytest.mark.parametrize("turns", [0.02, 0.1, 0.3, 1.0])
+def test_short_beside_the_period(turns):
+    """As w T goes to 0, x follows w^2 u by four integrations: m* w^2 T^4 = 4^3 3!, Chebyshev edges."""
+    plan = min_peak(omega=turns / 7, damping=0.0, duration=7.0, x1=1.0)
+    assert plan.peak * 49 * turns**2 == pytest.approx(384, rel=turns**2 / 100)
+    chebyshev = 7 / 2 * (1 - np.cos(np.pi * np.array([1, 2, 3]) / 4))
+    assert plan.switch_times == pytest.approx(chebyshev, abs=turns**2 / 50 + 1e-7)
+    fuel = min_fuel(omega=turns / 7, damping=0.0, duration=7.0, x1=1.0, bound=2 * plan.peak)
+    # An ulp of an edge counts with the level, beside the 4/T^2 of a rigid body.
+    assert max(plan.residual, fuel.residual) < 1e-15 * plan.peak * 49 + 1e-12
+
+
+@pytest.mark.parametrize("turns", [300.0, 3000.0])
+def test_long_beside_the_period(turns):
+    plan = min_peak(omega=turns / 7, damping=0.02 * turns / 7, duration=7.0, x1=1.0)
+    assert 4 / 49 < plan.peak < 4 / 49 * (1 + 4 / turns)  # almost that of a rigid body
+    assert plan.residual < 1e-11
 
 
 def test_modes_that_hardly_differ():
@@ -180,7 +189,7 @@ def test_modes_that_hardly_differ():
 
 
 def test_modes_that_cannot_be_told_apart_are_refused():
-    with pytest.raises(ArithmeticError, match="no control passes the test of optimality"):
+    with pytest.raises(ArithmeticError, match="double precision"):
         min_peak(omega=[1.0, 1.0 + 1e-14], damping=[0.0, 0.0], duration=0.01, x1=1.0)
 
 
@@ -220,4 +229,4 @@ def test_grids_are_refined_where_it_is_asked():
     finer = refined(nodes, np.array([0.33, 0.33 + 1e-12, 0.0, 1.0]))
     assert set(nodes.tolist()) <= set(finer.tolist())
     assert np.min(np.diff(finer)) > 1e-7
-    assert np.sum((finer > 0.3) & (finer < 0.4)) == 4
+    assert np.sum((finer > 0.3 + 1e-9) & (finer < 0.4 - 1e-9)) == 4
