@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from spacecraft_sim.trajectory import Trajectory
+
 Array = np.ndarray
 Look = Literal["bound", "switching", "aid"]  # what is guaranteed, where the law acts, what explains
 
@@ -121,6 +123,34 @@ def worst_to_come(value: Array) -> Array:
         value: Samples, shape (n,).
     """
     return np.maximum.accumulate(np.abs(value)[::-1])[::-1]
+
+
+def half_width(portrait: Portrait, k: int) -> float:
+    """Returns half the window of a portrait: a little more than its bounds, which so fill it.
+
+    Args:
+        portrait: The portrait.
+        k: 0 for the x axis, 1 for the y axis.
+
+    Returns:
+        The half width in the unit of the signal; 0 if the portrait has no bound.
+    """
+    shown = [line.points[:, k] for line in portrait.lines if line.look == "bound"]
+    return 1.45 * max((float(np.nanmax(np.abs(points))) for points in shown), default=0.0)
+
+
+def locked(measured: Trajectory, portrait: Portrait) -> Array:
+    """Returns whether the pulse that is on at a row is still younger than the minimum on-time.
+
+    Args:
+        measured: The flight.
+        portrait: For the channel and its minimum on-time.
+    """
+    sign = np.sign(measured[portrait.channel])
+    began = np.r_[True, np.diff(sign) != 0]
+    start = np.maximum.accumulate(np.where(began, np.arange(len(sign)), 0))
+    age = measured.time - measured.time[start]
+    return (sign != 0) & (age < portrait.min_on_time * (1 - 1e-9))
 
 
 def portraits(charts: Sequence[Portrait | Map]) -> list[Portrait]:

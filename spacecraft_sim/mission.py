@@ -4,6 +4,7 @@ Beside the command line this is the only module that knows the controllers.
 """
 
 import inspect
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -12,8 +13,19 @@ from typing import Any
 
 from pydantic import create_model
 
+import controllers
 from controllers import REGISTRY, Design
-from spacecraft_sim import beam, config, conservation, library, linearize, mjcf, reduced, spacecraft
+from spacecraft_sim import (
+    beam,
+    config,
+    conservation,
+    errata,
+    library,
+    linearize,
+    mjcf,
+    reduced,
+    spacecraft,
+)
 from spacecraft_sim.chart import charts_of, portraits
 from spacecraft_sim.checks import choices
 from spacecraft_sim.compare import Comparison, compare
@@ -40,6 +52,7 @@ class Mission:
         machine: The spacecraft that flies in MuJoCo.
         mujoco: The full plant.
         reduced: The reduced plant.
+        design: The function that designed the law.
         controller: The law.
         guarantees: What is claimed of it.
         thrusters: The thrusters of each plant.
@@ -50,6 +63,7 @@ class Mission:
     machine: Spacecraft
     mujoco: MujocoPhysics
     reduced: reduced.ReducedPhysics
+    design: Design
     controller: Controller
     guarantees: tuple[Guarantee, ...]
     thrusters: dict[PlantName, Thrusters]
@@ -60,6 +74,17 @@ class Mission:
         """The accuracy asked of the law, or that its charts promise, rad; None if there is none."""
         bands = [portrait.band for portrait in portraits(charts_of(self.controller))]
         return self.scenario.controller.get("accuracy", next(iter(bands), None))
+
+    @property
+    def errata(self) -> tuple[errata.Section, ...]:
+        """Known misprints of the papers that the law, its module or its claims cite."""
+        balances = len(conservation.momentum_balances(self.reduced.model))  # true of any law
+        own = self.guarantees[: len(self.guarantees) - balances]
+        about = (self.design, sys.modules[self.design.__module__])
+        cited = "\n".join([*(part.__doc__ or "" for part in about), *(g.source for g in own)])
+        listed = Path(controllers.__file__ or "").with_name("ERRATA.md")
+        found = errata.sections(listed.read_text(encoding="utf-8"))
+        return tuple(section for section in found if section.concerns(cited))
 
     def environment(self, plant: PlantName = "mujoco") -> Environment:
         """Returns a dm_control environment with the law closed inside its task.
@@ -174,6 +199,7 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
         machine=machine,
         mujoco=full,
         reduced=plant,
+        design=design,
         controller=law,
         guarantees=guarantees + conservation.momentum_balances(plant.model),
         thrusters={"mujoco": Thrusters(machine.thrusters), "reduced": thrusters},

@@ -16,6 +16,8 @@ from spacecraft_sim.chart import (
     Map,
     Portrait,
     Region,
+    half_width,
+    locked,
     portraits,
     pulses,
     worst_to_come,
@@ -75,11 +77,11 @@ def _portrait(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
     look = {"color": FLIGHT, "linewidth": 1.0, "label": "flight", "zorder": 4}
     axes.add_collection(LineCollection(list(pieces), **look))
     if portrait.min_on_time:
-        locked = _locked(measured, portrait)
+        young = locked(measured, portrait)
         look = {"color": BAD, "linewidth": 1.8, "label": "minimum on-time running", "zorder": 5}
-        axes.add_collection(LineCollection(list(pieces[locked[:-1]]), **look))
+        axes.add_collection(LineCollection(list(pieces[young[:-1]]), **look))
     axes.plot(x[0] / sx, y[0] / sy, "o", color=INK, markersize=5, label="start", zorder=6)
-    half = [_half_width(portrait, k) / (sx, sy)[k] for k in (0, 1)]
+    half = [half_width(portrait, k) / (sx, sy)[k] for k in (0, 1)]
     axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]))
     labels = [
         f"{name.replace('_', ' ')}, {letter}{measured.units[name]}"
@@ -109,25 +111,8 @@ def _regions(axes: Axes, regions: Sequence[Region], scales: tuple[float, float])
 
 
 def _scales(portrait: Portrait, x: Array, y: Array) -> tuple[tuple[float, str], tuple[float, str]]:
-    half = [_half_width(portrait, k) for k in (0, 1)]
+    half = [half_width(portrait, k) for k in (0, 1)]
     return prefix(half[0] or float(np.abs(x).max())), prefix(half[1] or float(np.abs(y).max()))
-
-
-def _half_width(portrait: Portrait, k: int) -> float:
-    """Half the window: a little more than what is guaranteed, so that the contour fills it."""
-    shown = [line.points[:, k] for line in portrait.lines if line.look == "bound"]
-    return 1.45 * max((float(np.nanmax(np.abs(points))) for points in shown), default=0.0)
-
-
-def _locked(measured: Trajectory, portrait: Portrait) -> Array:
-    """Whether the pulse that is on at a row is still younger than the minimum on-time."""
-    sign = np.sign(measured[portrait.channel])
-    began = np.r_[True, np.diff(sign) != 0]
-    age = (
-        measured.time
-        - measured.time[np.maximum.accumulate(np.where(began, np.arange(len(sign)), 0))]
-    )
-    return (sign != 0) & (age < portrait.min_on_time * (1 - 1e-9))
 
 
 def _lines(axes: Axes, lines: Sequence[Line], scales: tuple[float, float]) -> None:

@@ -91,7 +91,7 @@ def write_pictures(
     predicted: Trajectory,
     comparison: Comparison,
 ) -> None:
-    """Writes `summary.png`, `recording.rrd` and, for a law that has charts, `charts.png`.
+    """Writes `summary.png`, `report.html`, `recording.rrd`; `charts.png` for a law with charts.
 
     Args:
         folder: The folder of the run.
@@ -100,13 +100,15 @@ def write_pictures(
         predicted: Flight of the reduced plant.
         comparison: How it came out.
     """
-    from spacecraft_sim import drawing, plots, plots_chart, record
+    from spacecraft_sim import drawing, plots, plots_chart, record, report
 
     charts = charts_of(mission.controller)
+    drawn = drawing.draw(mission.mujoco.model.ptr, mission.machine, measured)
+    text = resolved(mission.scenario)
     shown = {
         "measured": measured,
         "predicted": predicted,
-        "drawing": drawing.draw(mission.mujoco.model.ptr, mission.machine, measured),
+        "drawing": drawn,
         "verdicts": comparison.verdicts,
         "title": mission.scenario.title,
         "band": mission.accuracy,
@@ -115,7 +117,15 @@ def write_pictures(
     if charts:
         title = mission.scenario.title
         plots_chart.page(folder / "charts.png", measured=measured, charts=charts, title=title)
-    text = resolved(mission.scenario)
+    report.write(
+        folder / "report.html",
+        mission=mission,
+        measured=measured,
+        predicted=predicted,
+        drawing=drawn,
+        comparison=comparison,
+        scenario_toml=text,
+    )
     record.write(folder / "recording.rrd", scenario_toml=text, charts=charts, **shown)
 
 

@@ -79,7 +79,7 @@ def test_page_shows_a_row_a_portrait(tmp_path):
 
 
 def test_a_locked_stretch_is_the_first_minimum_on_time_of_a_pulse():
-    locked = plots_chart._locked(flight(), PORTRAIT)
+    locked = chart.locked(flight(), PORTRAIT)
     time = flight().time
     assert locked[np.isclose(time % 2, 1.3)].all()
     assert not locked[np.isclose(time % 2, 1.55)].any()  # on, but free to stop

@@ -90,9 +90,7 @@ def test_a_control_constant_on_cells_does_no_better(name):
         np.append(np.zeros(n), -1.0), A_eq=np.column_stack([A, -c]), b_eq=np.zeros(len(c)),
         bounds=[(-1, 1)] * n + [(None, None)],
     )  # fmt: skip
-    cells = linprog(
-        np.full(2 * n, step), A_eq=np.column_stack([A, -A]), b_eq=c, bounds=(0, bound)
-    )
+    cells = linprog(np.full(2 * n, step), A_eq=np.column_stack([A, -A]), b_eq=c, bounds=(0, bound))
     fuel = min_fuel(**asked, bound=bound).fuel
     # What the grid costs; tolerance of HiGHS and of Gauss below.
     assert -1e-6 < -1 / best.fun / peak - 1 < 1e-4

@@ -99,9 +99,7 @@ def test_the_least_time_is_the_first_that_will_do(asked):
 def test_more_modes_cost_more():
     asked = {"duration": 9.0, "x1": 1.0}
     omega, damping = [1.0, 2.6, 5.1], [0.02, 0.1, 0.3]
-    peaks = [
-        min_peak(omega=omega[:n], damping=damping[:n], **asked).peak for n in (1, 2, 3)
-    ]
+    peaks = [min_peak(omega=omega[:n], damping=damping[:n], **asked).peak for n in (1, 2, 3)]
     assert peaks == sorted(peaks)
     times = [
         min_time(omega=omega[:n], damping=damping[:n], x1=1.0, bound=0.2).duration

@@ -88,9 +88,7 @@ def test_a_shifted_problem():
 
 
 @settings(max_examples=50)
-@given(
-    st.lists(st.floats(-2, 2), min_size=6, max_size=6), st.floats(3.0, 40.0), st.floats(0, 0.3)
-)
+@given(st.lists(st.floats(-2, 2), min_size=6, max_size=6), st.floats(3.0, 40.0), st.floats(0, 0.3))
 def test_no_crossing_is_missed(multipliers, w, zeta):
     modes = modes_of([w, 2.3 * w], [2 * zeta * w, 0.1 * w])
     curve = modes.curve(np.array(multipliers))

@@ -120,9 +120,7 @@ def test_residual_vibration_is_the_amplitude_that_rings_on():
     amplitude = float(residual_vibration(PLAN, omega=omega, damping=damping))
     t = np.linspace(0, 6, 60_001)
     beta = math.sqrt(omega**2 - 0.04)
-    ringing = np.exp(-0.2 * t) * (
-        y * np.cos(beta * t) + (rate + 0.2 * y) / beta * np.sin(beta * t)
-    )
+    ringing = np.exp(-0.2 * t) * (y * np.cos(beta * t) + (rate + 0.2 * y) / beta * np.sin(beta * t))
     # Sampled at 1e-4 s: (beta h)^2/8 of the amplitude.
     assert np.max(np.abs(ringing) * np.exp(0.2 * t)) == pytest.approx(amplitude, rel=1e-7)
 
