@@ -47,13 +47,13 @@ def page(path: Path, *, measured: Trajectory, charts: Charts, title: str) -> Non
     """
     drawn, maps = portraits(charts), [chart for chart in charts if isinstance(chart, Map)]
     rows = max(len(drawn), 1)
-    figure = Figure(figsize=(18.0, 9.6 * rows + 0.6), dpi=DPI)
+    figure = Figure(figsize=(18.0, 9.6 * rows + 1.1), dpi=DPI)
     FigureCanvasAgg(figure)
-    figure.text(0.012, 1 - 0.3 / (9.6 * rows + 0.6), title, size=17, weight="bold", color=INK,
+    figure.text(0.012, 1 - 0.3 / (9.6 * rows + 1.1), title, size=17, weight="bold", color=INK,
                 va="center")  # fmt: skip
     grid = figure.add_gridspec(
-        rows, 2, left=0.05, right=0.985, top=1 - 0.9 / (9.6 * rows + 0.6),
-        bottom=0.55 / (9.6 * rows + 0.6), wspace=0.16, hspace=0.2, width_ratios=(1.15, 1),
+        rows, 2, left=0.05, right=0.985, top=1 - 0.9 / (9.6 * rows + 1.1),
+        bottom=1.05 / (9.6 * rows + 1.1), wspace=0.16, hspace=0.2, width_ratios=(1.15, 1),
     )  # fmt: skip
     for k, portrait in enumerate(drawn):
         _portrait(figure.add_subplot(grid[k, 0]), portrait, measured)

@@ -348,7 +348,11 @@
         const turn = pose.slice(3).map((x) => x / size);
         for (const { points, faces, rgb } of shapes) {
           const world = points.map((p) => turned(turn, p).map((x, n) => x + place[n]));
-          const depth = Math.max(...world.map((p) => dot(p, near))), flat = world.map(project);
+          const flat = world.map(project), along = world.map((p) => dot(p, near));
+          // Of shapes about one centre the longer is behind: a strut runs through a hull.
+          const middle = world[0].map((_, m) => world.reduce((sum, p) => sum + p[m], 0) / world.length);
+          const size = Math.max(...world.map((p) => Math.hypot(...p.map((x, m) => x - middle[m]))));
+          const depth = along.reduce((a, b) => a + b, 0) / along.length - 1e-3 * size;
           if (!faces.length) outlines.push([depth, hull(flat), rgb, 1]);
           for (const face of faces) {
             const side = (n) => world[face[n]].map((x, m) => x - world[face[0]][m]);

@@ -45,7 +45,7 @@ ONLY_IN = {
     "mujoco": {"mjcf", "readings", "physics", "linearize", "drawing", "elastic_mjcf"},
     "dm_control": {"physics", "reduced", "task", "simulate"},
     "rerun": {"record", "record_chart"},
-    "matplotlib": {"plots", "plots_chart"},
+    "matplotlib": {"plots", "plots_chart", "plots_film"},
     "controllers": {"mission", "cli"},
 }
 
