@@ -199,12 +199,17 @@ class Claims:
         angle, rate = (trajectory[name] for name in self.sensors)
         rows, _ = self._switchings(trajectory)
         first = int(rows[0]) if rows.size else len(rate)
+        moving = np.flatnonzero(rate)
+        way = np.sign(rate[moving])
+        turns = np.flatnonzero(way[:-1] != way[1:])
         found = []
-        for i in np.flatnonzero(rate[:-1] * rate[1:] < 0).tolist():
+        for i, j in zip(moving[turns].tolist(), moving[turns + 1].tolist(), strict=True):
             if i < first:
                 continue
-            pair = slice(i, i + 2)
-            worst, time = peak(trajectory.time[pair], angle[pair], rate[pair])
+            rows_between = slice(i, j + 1)
+            worst, time = peak(
+                trajectory.time[rows_between], angle[rows_between], rate[rows_between]
+            )
             found.append((time, math.copysign(worst, float(angle[i])), float(np.sign(rate[i]))))
         return found
 

@@ -87,7 +87,7 @@ def _portrait(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
         f"{name.replace('_', ' ')}, {letter}{measured.units[name]}"
         for name, letter in zip(portrait.signals, (px, py), strict=True)
     ]
-    panel(axes, portrait.title, labels[0], labels[1])
+    panel(axes, portrait.title, labels[0], labels[1], below=True)
 
 
 def _smooth(time: Array, x: Array, v: Array) -> Array:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spacecraft_sim import plots_chart
+from spacecraft_sim import chart, plots_chart
 from spacecraft_sim.chart import Line, Map, Portrait, Region, charts_of, pulses, worst_to_come
 from spacecraft_sim.trajectory import Trajectory
 
@@ -68,9 +68,9 @@ def test_page_shows_a_row_a_portrait(tmp_path):
     from PIL import Image
 
     sizes = []
-    for k, charts in enumerate([(PORTRAIT, MAP), (PORTRAIT, MAP, PORTRAIT, MAP)]):
+    for k, drawn in enumerate([(PORTRAIT, MAP), (PORTRAIT, MAP, PORTRAIT, MAP)]):
         path = tmp_path / f"{k}.png"
-        plots_chart.page(path, measured=flight(), charts=charts, title="A law")
+        plots_chart.page(path, measured=flight(), charts=drawn, title="A law")
         with Image.open(path) as picture:
             sizes.append(picture.size)
             assert np.asarray(picture.convert("L")).std() > 10  # not blank
