@@ -108,13 +108,18 @@ class Mission:
         )
 
     def fly(
-        self, plant: PlantName = "mujoco", *, progress: Callable[[float], None] | None = None
+        self,
+        plant: PlantName = "mujoco",
+        *,
+        progress: Callable[[float], None] | None = None,
+        watch: Callable[[Trajectory], None] | None = None,
     ) -> Trajectory:
         """Flies the scenario on one plant.
 
         Args:
             plant: Which plant.
             progress: Called with the simulated time, s.
+            watch: Called during the flight with its rows, some at a time, each row once.
         """
         meta = {
             "plant": plant,
@@ -122,7 +127,7 @@ class Mission:
             "seed": self.scenario.seed,
             "versions": versions(),
         }
-        return simulate(self.environment(plant), meta=meta, progress=progress)
+        return simulate(self.environment(plant), meta=meta, progress=progress, watch=watch)
 
     def judge(self, measured: Trajectory, predicted: Trajectory) -> Comparison:
         """Checks the guarantees on both flights and compares them.

@@ -1,6 +1,7 @@
 """The only loop: an environment, and the flight of one episode."""
 
 from collections.abc import Callable
+from time import perf_counter
 from typing import Any
 
 import dm_env
@@ -9,6 +10,8 @@ from dm_control.rl import control
 
 from spacecraft_sim.task import ControlTask
 from spacecraft_sim.trajectory import Recorder, Trajectory
+
+CHUNK, PAUSE = 250, 0.2  # least rows and least wall time, s, between two looks of a watcher
 
 
 class Environment(control.Environment):
@@ -57,6 +60,7 @@ def simulate(
     *,
     meta: dict[str, Any],
     progress: Callable[[float], None] | None = None,
+    watch: Callable[[Trajectory], None] | None = None,
 ) -> Trajectory:
     """Flies one episode without an outside agent and records it.
 
@@ -64,6 +68,7 @@ def simulate(
         environment: The environment.
         meta: Plain data to keep with the trajectory.
         progress: Called with the simulated time after each control step, s.
+        watch: Called during the flight with its rows, some at a time, each row once.
 
     Returns:
         The flight; if the plant diverged, the rows before, with the reason in `meta["diverged"]`.
@@ -71,14 +76,25 @@ def simulate(
     task, physics = environment.task, environment.physics
     recorder = task.recorder = Recorder(task.units(physics))
     action = np.zeros(environment.action_spec().shape)
+    shown, looked = 0, perf_counter()
+
+    def show(stop: int) -> None:
+        nonlocal shown, looked
+        if watch and stop > shown:
+            watch(recorder.trajectory(meta, shown, stop))
+            shown, looked = stop, perf_counter()
+
     try:
         step = environment.reset()
         while not step.last():
             step = environment.step(action)
             if progress:
                 progress(physics.time())
+            if len(recorder) > shown + CHUNK and perf_counter() > looked + PAUSE:
+                show(len(recorder) - 1)  # the last row may still be replaced
     except control.PhysicsError as error:
         meta = {**meta, "diverged": str(error)}
     finally:
         task.recorder = None
+    show(len(recorder))
     return recorder.trajectory(meta)

@@ -1,7 +1,7 @@
 """A recorded flight: time, signals by name, units; how it is collected, saved and loaded."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -97,16 +97,35 @@ class Recorder:
         else:
             self._rows.append(row)
 
-    def trajectory(self, meta: dict[str, Any]) -> Trajectory:
-        """Returns what was recorded so far.
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def trajectory(
+        self, meta: dict[str, Any], start: int = 0, stop: int | None = None
+    ) -> Trajectory:
+        """Returns what was recorded so far, or some of its rows.
 
         Args:
             meta: Plain data about the flight.
+            start: The first row.
+            stop: The row after the last; all if left out.
         """
-        table = np.array(self._rows, dtype=float).reshape(-1, 1 + len(self.units)).T
+        rows = self._rows[start:stop]
+        table = np.array(rows, dtype=float).reshape(-1, 1 + len(self.units)).T
         table.setflags(write=False)
         signals = dict(zip(self.units, table[1:], strict=True))
         return Trajectory(time=table[0], signals=signals, units=self.units, meta=meta)
+
+
+def selected(trajectory: Trajectory, rows: Any) -> Trajectory:
+    """Returns some rows of a flight.
+
+    Args:
+        trajectory: The flight.
+        rows: A slice, or row numbers or truth values of shape (n,).
+    """
+    signals = {name: value[rows] for name, value in trajectory.signals.items()}
+    return replace(trajectory, time=trajectory.time[rows], signals=signals)
 
 
 def peak(time: Array, value: Array, rate: Array) -> tuple[float, float]:
