@@ -22,6 +22,7 @@ S = (p + v1 c/2) (E - 1)/(c (2 - E)), and in the end |s| <= S, |beta| <= S/c,
 """
 
 import math
+from dataclasses import replace
 from functools import partial
 
 from controllers.efremov_claims import PAPER, Claims, Theorem
@@ -106,6 +107,9 @@ def design_local(
             Assumption(text="|s| < delta_0 at first", value=abs(c * beta + v), limit=delta),
         )
 
+    angle, rate = 3 * accuracy / 4, 5 * c * accuracy / 4
+    corners = ((angle, rate), (-angle, rate), (-angle, -rate), (angle, -rate))
+    law = replace(law, accuracy=accuracy, contour=corners)
     theorem = Theorem(
         source=f"{PAPER}, Theorem 1",
         parameters=(*parameters, *_hardware(law, thrusters, max_delay)),
@@ -113,8 +117,8 @@ def design_local(
         accuracy=accuracy,
         settling=lambda beta, v: 0.0,
         time_source="",
-        final_angle=3 * accuracy / 4,
-        final_rate=5 * c * accuracy / 4,
+        final_angle=angle,
+        final_rate=rate,
         disturbance=c**2 * accuracy / 4,
         entry=entry,
     )
@@ -184,6 +188,9 @@ def design_nonlocal(
     law = _law(model, c, thresholds, p, attraction_level, compensated_delay, period)  # step 5
     E = math.exp(c * max_delay)
     S = (p + v1 * c / 2) / c * (E - 1) / (2 - E)
+    b = S / c  # where |s| = S meets |beta| = S/c
+    corners = ((b, 0.0), (-b, 2 * S), (-b, 0.0), (b, -2 * S))
+    law = replace(law, accuracy=accuracy, contour=corners)
 
     def entry(beta: float, v: float) -> tuple[Assumption, ...]:
         return (

@@ -24,6 +24,7 @@ import numpy as np
 from controllers.efremov import design_nonlocal, settling_time
 from controllers.efremov_claims import PAPER, Claims, Theorem
 from controllers.efremov_relay import RATE, MultilevelRelay
+from spacecraft_sim.chart import Charts
 from spacecraft_sim.checks import positive
 from spacecraft_sim.guarantee import Assumption, Guarantee
 from spacecraft_sim.modal_form import driven_coordinate, modal_form, real_form, row_of
@@ -81,6 +82,11 @@ class ObservedRelay:
     period: float
     sensors: tuple[str, ...]
     thrusters: tuple[str, ...] = (CHANNEL,)
+
+    @property
+    def charts(self) -> Charts:
+        """Those of the relay, which sees estimates of what is drawn."""
+        return self.relay.charts
 
     def init(self) -> Memory:
         """Returns the memory before the first measurement."""

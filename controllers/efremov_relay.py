@@ -9,9 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
+from spacecraft_sim.chart import Charts, Line, Portrait
 from spacecraft_sim.checks import positive
 
 ANGLE, RATE = "quasi_rigid_angle_z", "quasi_rigid_rate_z"
+FAR = 2 * math.pi  # how far the switching lines are drawn, rad
 
 
 class Attraction(NamedTuple):
@@ -103,6 +107,8 @@ class MultilevelRelay:
         compensated_delay: Delay for which the pulses are planned ahead, s.
         lowest: p, the acceleration of the lowest level, rad/s^2.
         period: Sampling period, s; None for continuous time.
+        accuracy: eps, rad; None if none is promised.
+        contour: Corners of the region of (beta, v) in which the theorem ends, rad and rad/s.
         sensors: beta/J and v/J.
         thrusters: The one channel.
     """
@@ -115,8 +121,34 @@ class MultilevelRelay:
     compensated_delay: float
     lowest: float
     period: float | None
+    accuracy: float | None = None
+    contour: tuple[tuple[float, float], ...] = ()
     sensors: tuple[str, ...] = (ANGLE, RATE)
     thrusters: tuple[str, ...] = ("thruster_z",)
+
+    @property
+    def charts(self) -> Charts:
+        """The phase plane with s = 0, the thresholds and the region in which the theorem ends."""
+        lines = [Line(name="s = c beta + v = 0", points=self._where(0.0), look="switching")]
+        for n, v in enumerate(self.thresholds, start=1):
+            points = np.vstack([self._where(v), [[math.nan, math.nan]], self._where(-v)])
+            lines.append(Line(name=f"|s| = v{n}", points=points))
+        if self.contour:
+            closed = np.array([*self.contour, self.contour[0]])
+            lines.append(Line(name="in the end", points=closed, look="bound"))
+        portrait = Portrait(
+            name="relay",
+            title="Where the relay switches",
+            signals=(ANGLE, RATE),
+            channel=self.thrusters[0],
+            band=self.accuracy,
+            lines=tuple(lines),
+        )
+        return (portrait,)
+
+    def _where(self, s: float) -> np.ndarray:
+        """The line c beta + v = s."""
+        return np.array([[-FAR, s + self.c * FAR], [FAR, s - self.c * FAR]])
 
     def init(self) -> None:
         """Returns no memory: the pulses follow from the first measurement."""
