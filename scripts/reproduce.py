@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from spacecraft_sim import drawing, mission, record, run_folder
+from spacecraft_sim import mission, record, run_folder
 from support import efremov_figure as figure
 from support import efremov_reference as reference
 
@@ -26,16 +26,10 @@ def fly(ready: mission.Mission, folder: Path) -> None:
     """
     measured, predicted = ready.fly(), ready.fly("reduced")
     figure.write(folder / "figure.png", measured, predicted, ready.scenario)
-    record.write(
-        folder / "recording.rrd",
-        measured=measured,
-        predicted=predicted,
-        drawing=drawing.draw(ready.mujoco.model.ptr, ready.machine, measured),
-        verdicts=ready.judge(measured, predicted).verdicts,
-        scenario_toml=run_folder.resolved(ready.scenario),
-        title=ready.scenario.title,
-        band=ready.scenario.controller["accuracy"],
-    )
+    subject = run_folder.subject(ready)
+    verdicts = ready.judge(measured, predicted).verdicts
+    beneath = record.reduced(subject, predicted)
+    record.write(folder / "recording.rrd", subject, measured, beneath, verdicts)
 
 
 def main(argv: list[str] | None = None) -> int:

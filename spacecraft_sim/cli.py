@@ -72,6 +72,12 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("name", metavar="NAME", help="scenario, or path of a TOML file")
     run.add_argument("--out", type=Path, help="folder to write; default runs/NAME, numbered")
     run.add_argument("--set", help="change a key of the scenario", **settings)
+    factor = "how many times too far the recording bends booms; a round factor if left out"
+    run.add_argument("--exaggeration", type=float, metavar="FACTOR", help=factor)
+    live = run.add_mutually_exclusive_group()
+    shown = "show the flight in a viewer that is open on this machine; 127.0.0.1:9876 if left out"
+    live.add_argument("--connect", nargs="?", const="", metavar="ADDRESS", help=shown)
+    live.add_argument("--spawn", action="store_true", help="show the flight in a new viewer")
     export = command(_export, "write the complete MJCF of a spacecraft as one file")
     export.add_argument("name", metavar="NAME", help="spacecraft or scenario, or path of its TOML")
     export.add_argument("file", type=Path, metavar="FILE.xml", help="file to write")
@@ -141,17 +147,26 @@ def _fill(table: Table, rows: Sequence[Sequence[str]]) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     mission = _assemble(arguments)
-    from spacecraft_sim import run_folder
+    from spacecraft_sim import run_folder, viewer
 
+    address = viewer.spawn() if arguments.spawn else viewer.found(arguments.connect)
     folder = run_folder.create(arguments.out, mission.scenario.name)
     try:
-        measured, predicted = _fly(mission, "mujoco"), _fly(mission, "reduced")
-        run_folder.write_flights(folder, mission.scenario, measured, predicted)
-        for flight in (measured, predicted):
-            if reason := flight.meta.get("diverged"):
-                print(f"spacecraft-sim: {reason}\nrecorded so far: {folder}", file=sys.stderr)
-                return BROKEN
-        comparison = mission.judge(measured, predicted)
+        from spacecraft_sim import record
+
+        subject = run_folder.subject(mission)
+        with record.Recording(subject, folder / "recording.rrd", address) as recording:
+            predicted = _fly(mission, "reduced")
+            recording.expect(record.reduced(subject, predicted, arguments.exaggeration))
+            measured = _fly(mission, "mujoco", recording.take)
+            run_folder.write_flights(folder, mission.scenario, measured, predicted)
+            for flight in (measured, predicted):
+                if reason := flight.meta.get("diverged"):
+                    recording.stop(reason)
+                    print(f"spacecraft-sim: {reason}\nrecorded so far: {folder}", file=sys.stderr)
+                    return BROKEN
+            comparison = mission.judge(measured, predicted)
+            recording.conclude(comparison.verdicts)
         run_folder.write_verdicts(folder, mission, comparison)
         run_folder.write_pictures(folder, mission, measured, predicted, comparison)
     except Exception:
@@ -166,11 +181,15 @@ def _run(arguments: argparse.Namespace) -> int:
     return HOLDS if all(verdict.holds for verdict in comparison.verdicts) else FAILS
 
 
-def _fly(mission: "Mission", plant: "PlantName") -> "Trajectory":
+def _fly(
+    mission: "Mission",
+    plant: "PlantName",
+    watch: "Callable[[Trajectory], None] | None" = None,
+) -> "Trajectory":
     """Flies one plant with a progress line, if a person is watching."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        return mission.fly(plant)
+        return mission.fly(plant, watch=watch)
     columns = (
         TextColumn("{task.description:>8}"),
         TextColumn("{task.completed:8.1f} of {task.total:.1f} s simulated"),
@@ -185,7 +204,7 @@ def _fly(mission: "Mission", plant: "PlantName") -> "Trajectory":
             elapsed = max(progress.get_time() - started, 1e-9)
             progress.update(task, completed=time, factor=time / elapsed)
 
-        return mission.fly(plant, progress=show)
+        return mission.fly(plant, progress=show, watch=watch)
 
 
 def _verdict_table(comparison: "Comparison") -> Table:

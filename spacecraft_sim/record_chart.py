@@ -1,81 +1,267 @@
-"""The charts of a law in a recording: phase portraits and maps as plane views."""
+"""Planes of a recording: phase portraits of two flights with a law's lines, and its maps.
+
+A plane view has equal axes and y down.  The flight is logged in its own units; the origin of each
+view carries a scale that brings its window to the square from -1 to 1, and up to -1.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from spacecraft_sim.chart import Charts, Map, Portrait
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.chart import Charts, Line, Map, Portrait, portraits
+from spacecraft_sim.record_scene import TIMELINE, Color, Stream
+from spacecraft_sim.trajectory import Trajectory, moving_axes
 
 Array = np.ndarray
 
 COLORS = {"bound": (98, 205, 132), "switching": (199, 125, 255), "aid": (120, 126, 140)}
 REGIONS = ((255, 190, 110), (110, 160, 230), (170, 140, 220), (120, 200, 160))
-FLIGHT, HERE, NIGHT = (77, 163, 255), (255, 98, 74), (13, 15, 22)
-TIMELINE = "sim_time"
+HERE, BAND, NIGHT = (255, 98, 74), (15, 38, 27), (13, 15, 22)
+AXIS, TICK = (70, 75, 88), (150, 157, 172)
+STRIDE = 10  # rows to a strip of a track: a view shows or leaves out whole strips
+FINAL = 60.0  # the end of a flight, shown on its own, s
+FAR = 4.0  # how far lines are drawn, in half-widths of the window
 
 
-def log(stream: rr.RecordingStream, measured: Trajectory, charts: Charts) -> None:
-    """Logs the charts, each under `charts/<name>`, scaled to its largest line or region.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plane:
+    """A view of a portrait.
 
-    A plane view has equal axes and y down, so both axes are scaled and y is turned over.
+    Attributes:
+        portrait: The portrait.
+        word: Name of the view in paths.
+        title: What it shows.
+        half: Half-widths of its window, in the units of the signals.
+        since: Start of what is shown of the flights, s; None for all.
+    """
+
+    portrait: Portrait
+    word: str
+    title: str
+    half: tuple[float, float]
+    since: float | None = None
+
+    @property
+    def origin(self) -> str:
+        """Path of the view."""
+        return f"phase/{_slug(self.portrait.name)}/{self.word}"
+
+
+def planes(charts: Charts, flight: Trajectory, band: float | None) -> tuple[Plane, ...]:
+    """Returns the views of each portrait: the whole flight, its end, and what is guaranteed.
+
+    Args:
+        charts: What the law draws; the axis that moves most gets a portrait of its own if nothing.
+        flight: A flight that is known beforehand, for the windows.
+        band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
+    """
+    drawn, found = portraits(charts), []
+    if not drawn:
+        axis = next(iter(moving_axes(flight, "quasi_rigid_angle")), "")
+        names = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
+        if all(name in flight.signals for name in names):
+            drawn = [Portrait(name="plane", title="", signals=names, channel="", band=band)]
+    for portrait in drawn:
+        if not all(name in flight.signals for name in portrait.signals):
+            continue
+        last = max(float(flight.time[-1]) - FINAL, 0.0)
+        ends = (("whole", "whole flight", None), ("end", "last minute", last))
+        for word, title, since in ends:
+            late = flight.time >= (since or 0.0)
+            half = [1.1 * float(np.abs(flight[s][late]).max()) for s in portrait.signals]
+            window = half[0] or 1.0, half[1] or 1.0
+            plane = Plane(portrait=portrait, word=word, title=title, half=window, since=since)
+            found.append(plane)
+        if bounds := [line.points for line in portrait.lines if line.look == "bound"]:
+            half = (1.3 * np.nanmax(np.abs(np.vstack(bounds)), axis=0)).tolist()
+            window = half[0] or 1.0, half[1] or 1.0
+            found.append(
+                Plane(portrait=portrait, word="bound", title="what is guaranteed", half=window)
+            )
+    return tuple(found)
+
+
+def plane_frames(stream: Stream, drawn: Sequence[Plane], flight: Trajectory) -> None:
+    """Logs what stands still in the planes: axes with units, the law's lines, the band.
 
     Args:
         stream: The recording.
-        measured: The flight.
-        charts: The charts.
+        drawn: The planes.
+        flight: A flight, for the units.
+    """
+    for plane in drawn:
+        portrait, half = plane.portrait, np.array(plane.half) * (1, -1)
+        stream.log(plane.origin, rr.Transform3D(scale=[*half, 1.0]), static=True)
+        cross = [[(-1, 0), (1, 0)], [(0, -1), (0, 1)]]
+        axes = rr.LineStrips2D(cross, colors=AXIS, radii=-0.7, draw_order=2.0)
+        stream.log(f"{plane.origin}/axes", axes, static=True)
+        (x, y), ends = portrait.signals, [(1.6, -0.07), (0.9, -1.12)]
+        labels = [
+            f"{_words(x)} {plane.half[0]:.3g} {flight.units[x]}",
+            f"{_words(y)} {plane.half[1]:.3g} {flight.units[y]}",
+        ]
+        ticks = rr.Points2D(ends, labels=labels, colors=TICK, radii=-0.1)
+        stream.log(f"{plane.origin}/scale", ticks, static=True)
+        if portrait.band:
+            width = portrait.band / half[0]
+            line = [[(0.0, -FAR), (0.0, FAR)]]
+            look = {"colors": BAND, "radii": width, "draw_order": 1.0}
+            stream.log(f"{plane.origin}/band", rr.LineStrips2D(line, **look), static=True)
+        for k, region in enumerate(portrait.regions):
+            outline = np.vstack([region.outline, region.outline[:1]]) / half
+            path = f"{plane.origin}/regions/{_slug(region.name)}"
+            _line(stream, path, outline, REGIONS[k % len(REGIONS)], 1.0)
+        for k, line in enumerate(portrait.lines):
+            path = f"{plane.origin}/lines/{k}_{_slug(line.name)}"
+            _log_line(stream, path, line, half, (k + 1) / (len(portrait.lines) + 1))
+
+
+def _log_line(stream: Stream, path: str, line: Line, half: Array, share: float) -> None:
+    """A line of the law with its name at a share of the way through the window.
+
+    The viewer counts in single precision: what is far outside the window is cut off.
+    """
+    points, color = line.points / half, COLORS[line.look]
+    if len(pieces := _inside(points, np.array([FAR, FAR]))):
+        width = 1.6 if line.look == "bound" else 1.1
+        drawn = rr.LineStrips2D(list(pieces), colors=color, radii=-width, draw_order=10.0)
+        stream.log(path, drawn, static=True)
+    if len(seen := _inside(points, np.array([1.2, 0.95]))):
+        place = seen[0, 0] + share * (seen[0, 1] - seen[0, 0])
+        name = rr.Points2D([place], labels=[line.name], colors=color, radii=-0.1)
+        stream.log(f"{path}/name", name, static=True)
+
+
+def track_styles(
+    stream: Stream, drawn: Sequence[Plane], key: str, color: Color, beneath: bool
+) -> None:
+    """Logs how the flights look in the planes.
+
+    Args:
+        stream: The recording.
+        drawn: The planes.
+        key: Name of the flight in paths.
+        color: Its colour.
+        beneath: Whether it is drawn beneath the other.
+    """
+    width, order = (1.9, 30.0) if beneath else (0.8, 31.0)
+    for path in dict.fromkeys(_flight(plane.portrait, key) for plane in drawn):
+        look = rr.LineStrips2D.from_fields(colors=color, radii=-width, draw_order=order)
+        stream.log(f"{path}/track", look, static=True)
+        point = rr.Points2D.from_fields(
+            colors=color if beneath else (255, 255, 255), radii=-4.5 if beneath else -3.0
+        )
+        stream.log(f"{path}/now", point, static=True)
+
+
+def tracks(
+    stream: Stream,
+    drawn: Sequence[Plane],
+    part: Trajectory,
+    key: str,
+    before: Mapping[str, float],
+) -> None:
+    """Logs a part of a flight in the planes: the present point and short strips.
+
+    Args:
+        stream: The recording.
+        drawn: The planes.
+        part: The part, at least one row.
+        key: Name of the flight in paths.
+        before: The signals in the row before the part; empty at the start of a flight.
+    """
+    for portrait in {plane.portrait.name: plane.portrait for plane in drawn}.values():
+        if not all(name in part.signals for name in portrait.signals):
+            continue
+        path = _flight(portrait, key)
+        points = np.stack([part[name] for name in portrait.signals], axis=1)
+        times = [rr.TimeColumn(TIMELINE, duration=part.time)]
+        stream.send_columns(f"{path}/now", times, rr.Points2D.columns(positions=points))
+        last = [before[name] for name in portrait.signals] if before else points[0]
+        joined, first = np.vstack([last, points]), np.arange(0, len(points), STRIDE)
+        rows = np.minimum(first[:, None] + np.arange(STRIDE + 1), len(points))
+        strips = joined[rows].astype(np.float32)  # the last one may stand still at its end
+        times = [rr.TimeColumn(TIMELINE, duration=part.time[first])]
+        stream.send_columns(f"{path}/track", times, rr.LineStrips2D.columns(strips=strips))
+
+
+def maps(stream: Stream, charts: Charts) -> None:
+    """Logs the maps of parameters of a law, each scaled to its window.
+
+    Args:
+        stream: The recording.
+        charts: What the law draws.
     """
     for chart in charts:
-        path = f"charts/{chart.name}"
-        centre, half = _window(chart, measured)
+        if not isinstance(chart, Map):
+            continue
+        path = f"maps/{_slug(chart.name)}"
+        points = np.vstack([*(x.points for x in chart.lines), *(r.outline for r in chart.regions)])
+        low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+        centre, half = (low + high) / 2, np.where(high > low, (high - low) / 2, 1.0)
 
         def placed(points: Array, centre=centre, half=half) -> Array:
             return (np.asarray(points) - centre) / half * (1, -1)
 
-        for region, color in zip(chart.regions, REGIONS, strict=False):
+        for k, region in enumerate(chart.regions):
             outline = placed(np.vstack([region.outline, region.outline[:1]]))
-            _line(stream, f"{path}/regions/{_slug(region.name)}", outline, color, 1.5, region.name)
+            name = f"{path}/regions/{_slug(region.name)}"
+            _line(stream, name, outline, REGIONS[k % len(REGIONS)], 1.5, region.name)
         for k, line in enumerate(chart.lines):
-            width = 1.6 if line.look == "bound" else 1.0
             for n, piece in enumerate(_pieces(placed(line.points))):
                 name = f"{path}/lines/{k}_{n}_{_slug(line.name)}"
-                _line(stream, name, piece, COLORS[line.look], width, None if n else line.name)
-        if isinstance(chart, Portrait):
-            track = placed(np.stack([measured[s] for s in chart.signals], axis=1))
-            _line(stream, f"{path}/flight", track, FLIGHT, 0.7, None)
-            stream.log(f"{path}/now", rr.Points2D.from_fields(colors=HERE, radii=-5.0), static=True)
-            times = [rr.TimeColumn(TIMELINE, duration=measured.time)]
-            stream.send_columns(f"{path}/now", times, rr.Points2D.columns(positions=track))
-        else:
-            here = placed(np.array([chart.point]))
-            stream.log(f"{path}/here", rr.Points2D(here, colors=HERE, radii=-6.0), static=True)
+                _line(stream, name, piece, COLORS[line.look], 1.0, None if n else line.name)
+        here = rr.Points2D(placed(np.array([chart.point])), colors=HERE, radii=-6.0)
+        stream.log(f"{path}/here", here, static=True)
 
 
-def views(charts: Charts) -> list[rrb.Spatial2DView]:
-    """Returns a view for each chart.
+def plane_views(drawn: Sequence[Plane], keys: Sequence[str]) -> list[rrb.Spatial2DView]:
+    """Returns a view for each plane.
 
     Args:
-        charts: The charts.
+        drawn: The planes.
+        keys: Names of the flights in paths.
+    """
+    views, boundary = [], rr.TimeRangeBoundary
+    for plane in drawn:
+        start = boundary.infinite()
+        if plane.since is not None:
+            start = boundary.absolute(seconds=plane.since)
+        shown = rr.VisibleTimeRange(TIMELINE, start=start, end=boundary.infinite())
+        paths = [_flight(plane.portrait, key) for key in keys]
+        views.append(
+            rrb.Spatial2DView(
+                origin=plane.origin,
+                contents=["+ $origin/**", *(f"+ /{path}/**" for path in paths)],
+                name=f"Phase plane, {plane.title}",
+                visual_bounds=rrb.VisualBounds2D(x_range=[-1.5, 2.4], y_range=[-1.2, 1.2]),
+                background=NIGHT,
+                overrides={f"{path}/track": [rrb.VisibleTimeRanges(shown)] for path in paths},
+            )
+        )
+    return views
+
+
+def map_views(charts: Charts) -> list[rrb.Spatial2DView]:
+    """Returns a view for each map.
+
+    Args:
+        charts: What the law draws.
     """
     bounds = rrb.VisualBounds2D(x_range=[-1.1, 1.1], y_range=[-1.1, 1.1])
+    look = {"visual_bounds": bounds, "background": NIGHT}
     return [
-        rrb.Spatial2DView(
-            origin=f"charts/{chart.name}", name=chart.title, visual_bounds=bounds, background=NIGHT
-        )
+        rrb.Spatial2DView(origin=f"maps/{_slug(chart.name)}", name=chart.title, **look)
         for chart in charts
+        if isinstance(chart, Map)
     ]
 
 
-def _window(chart: Portrait | Map, measured: Trajectory) -> tuple[Array, Array]:
-    """Centre and half-widths of what is drawn."""
-    if isinstance(chart, Portrait):
-        bound = [line.points for line in chart.lines if line.look == "bound"]
-        shown = bound or [np.stack([measured[s] for s in chart.signals], axis=1)]
-        half = 1.45 * np.nanmax(np.abs(np.vstack(shown)), axis=0)
-        return np.zeros(2), np.where(half > 0, half, 1.0)
-    points = np.vstack([*(x.points for x in chart.lines), *(r.outline for r in chart.regions)])
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
-    return (low + high) / 2, np.where(high > low, (high - low) / 2, 1.0)
+def _flight(portrait: Portrait, key: str) -> str:
+    return f"phase/{_slug(portrait.name)}/flights/{key}"
 
 
 def _pieces(points: Array) -> list[Array]:
@@ -85,17 +271,26 @@ def _pieces(points: Array) -> list[Array]:
     return [p for p in (part[~np.isnan(part).any(axis=1)] for part in parts) if len(p) > 1]
 
 
+def _inside(points: Array, box: Array) -> Array:
+    """The segments of a line cut to |x|, |y| <= box: their ends, shape (n, 2, 2)."""
+    start, way = points[:-1], np.diff(points, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bounds = np.sort([(-box - start) / way, (box - start) / way], axis=0)
+    ends = np.stack([np.maximum(bounds[0].max(axis=1), 0), np.minimum(bounds[1].min(axis=1), 1)])
+    cut = ends[0] < ends[1]  # not where a coordinate is NaN: a break, or a segment along an edge
+    return start[cut, None] + ends.T[cut, :, None] * way[cut, None]
+
+
 def _line(
-    stream: rr.RecordingStream,
-    path: str,
-    points: Array,
-    color: tuple[int, int, int],
-    width: float,
-    label: str | None,
+    stream: Stream, path: str, points: Array, color: Color, width: float, label: str | None = None
 ) -> None:
     labels = [label] if label else None
-    line = rr.LineStrips2D([points], colors=color, radii=-width, labels=labels)
+    line = rr.LineStrips2D([points], colors=color, radii=-width, labels=labels, draw_order=10.0)
     stream.log(path, line, static=True)
+
+
+def _words(signal: str) -> str:
+    return signal.replace("_", " ").replace("quasi rigid", "quasi-rigid")
 
 
 def _slug(name: str) -> str:

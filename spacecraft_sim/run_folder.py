@@ -4,16 +4,19 @@ import json
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spacecraft_sim import config
-from spacecraft_sim.chart import charts_of
+from spacecraft_sim.chart import Map, charts_of
 from spacecraft_sim.compare import Comparison
 from spacecraft_sim.guarantee import Assumption, Verdict
 from spacecraft_sim.mission import Mission
 from spacecraft_sim.scenario import Scenario
 from spacecraft_sim.trajectory import Trajectory
 from spacecraft_sim.versions import versions
+
+if TYPE_CHECKING:
+    from spacecraft_sim.record import Subject
 
 
 def create(path: Path | None, name: str) -> Path:
@@ -84,6 +87,24 @@ def write_verdicts(folder: Path, mission: Mission, comparison: Comparison) -> No
     (folder / "verdict.json").write_text(text + "\n", encoding="utf-8")
 
 
+def subject(mission: Mission) -> "Subject":
+    """Returns what the recording of a mission is about.
+
+    Args:
+        mission: What is flown.
+    """
+    from spacecraft_sim import record
+
+    return record.Subject(
+        title=mission.scenario.title,
+        scenario=resolved(mission.scenario),
+        model=mission.mujoco.model.ptr,
+        machine=mission.machine,
+        band=mission.accuracy,
+        charts=charts_of(mission.controller),
+    )
+
+
 def write_pictures(
     folder: Path,
     mission: Mission,
@@ -91,7 +112,7 @@ def write_pictures(
     predicted: Trajectory,
     comparison: Comparison,
 ) -> None:
-    """Writes `summary.png`, `report.html`, `recording.rrd`; `charts.png` for a law with charts.
+    """Writes `summary.png`, `report.html` and, for a law that has maps, `charts.png`.
 
     Args:
         folder: The folder of the run.
@@ -100,22 +121,20 @@ def write_pictures(
         predicted: Flight of the reduced plant.
         comparison: How it came out.
     """
-    from spacecraft_sim import drawing, plots, plots_chart, record, report
+    from spacecraft_sim import drawing, plots, plots_chart, report
 
-    charts = charts_of(mission.controller)
+    title, charts = mission.scenario.title, charts_of(mission.controller)
     drawn = drawing.draw(mission.mujoco.model.ptr, mission.machine, measured)
-    text = resolved(mission.scenario)
-    shown = {
-        "measured": measured,
-        "predicted": predicted,
-        "drawing": drawn,
-        "verdicts": comparison.verdicts,
-        "title": mission.scenario.title,
-        "band": mission.accuracy,
-    }
-    plots.summary(folder / "summary.png", **shown)
-    if charts:
-        title = mission.scenario.title
+    plots.summary(
+        folder / "summary.png",
+        measured=measured,
+        predicted=predicted,
+        drawing=drawn,
+        verdicts=comparison.verdicts,
+        title=title,
+        band=mission.accuracy,
+    )
+    if any(isinstance(chart, Map) for chart in charts):
         plots_chart.page(folder / "charts.png", measured=measured, charts=charts, title=title)
     report.write(
         folder / "report.html",
@@ -124,9 +143,8 @@ def write_pictures(
         predicted=predicted,
         drawing=drawn,
         comparison=comparison,
-        scenario_toml=text,
+        scenario_toml=resolved(mission.scenario),
     )
-    record.write(folder / "recording.rrd", scenario_toml=text, charts=charts, **shown)
 
 
 def _plain(verdict: Verdict) -> dict[str, Any]:

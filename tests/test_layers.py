@@ -44,7 +44,13 @@ def imports(path, module):
 ONLY_IN = {
     "mujoco": {"mjcf", "readings", "physics", "linearize", "drawing", "elastic_mjcf"},
     "dm_control": {"physics", "reduced", "task", "simulate"},
-    "rerun": {"record", "record_chart"},
+    "rerun": {
+        "record",
+        "record_chart",
+        "record_layout",
+        "record_scene",
+        "record_signals",
+    },
     "matplotlib": {"plots", "plots_chart", "plots_film"},
     "controllers": {"mission", "cli"},
 }

@@ -1,0 +1,242 @@
+"""The spacecraft in 3D: solids, bending booms, a ghost, plumes that light when a thruster fires."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import rerun as rr
+
+from spacecraft_sim.changes import Changes
+from spacecraft_sim.drawing import Drawing, Jet, Shape, boom_points, turned
+from spacecraft_sim.frames import Frames
+
+Array = np.ndarray
+Stream = rr.RecordingStream
+Color = tuple[int, int, int]
+
+TIMELINE = "sim_time"
+TUBE = 0.06  # drawn radius of a boom, m
+FAINT, GREY = (52, 57, 70), (120, 126, 140)
+BOOMS: tuple[tuple[Color, Color], ...] = (  # of a boom and of its ghost
+    ((98, 205, 132), (46, 96, 62)),
+    ((199, 125, 255), (93, 58, 120)),
+    ((255, 200, 87), (120, 94, 41)),
+    ((90, 205, 215), (42, 96, 101)),
+)
+GHOST = 60  # opacity of a ghost's solids, of 255
+
+
+def setting(stream: Stream, rest: Drawing) -> None:
+    """Logs what never moves: the reference configuration and a ruler.
+
+    Args:
+        stream: The recording.
+        rest: The machine in its reference configuration.
+    """
+    stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    straight = [boom_points(rest, boom)[1][0][[0, -1]] for boom in rest.booms]
+    if straight:
+        look = {"colors": FAINT, "radii": -1.0}  # negative: in points of the screen
+        stream.log("world/attitude_zero", rr.LineStrips3D(straight, **look), static=True)
+    size = extent(rest)
+    length = max(m for m in (0.01, 0.1, 1.0, 5.0, 10.0, 50.0) if m <= size or m == 0.01)
+    ends = [(x, -0.55 * size, 0.0) for x in (-length / 2, length / 2)]
+    line = rr.LineStrips3D([ends], labels=[f"{length:g} m"], colors=GREY, radii=-1.0)
+    stream.log("world/ruler", line, static=True)
+
+
+def solids(stream: Stream, root: str, rest: Drawing, bodies: Sequence[str], ghost: bool) -> None:
+    """Logs shapes once, in the frames of their bodies, and the lines of the unbent booms.
+
+    Args:
+        stream: The recording.
+        root: Path of the flight's scene.
+        rest: The machine in its reference configuration.
+        bodies: The bodies that are drawn as solids; the first carries the booms.
+        ghost: Whether they are translucent.
+    """
+    shapes = [shape for shape in rest.shapes if shape.body in bodies]
+    for body, kind in sorted({(shape.body, shape.kind) for shape in shapes}):
+        alike = [s for s in shapes if (s.body, s.kind) == (body, kind)]
+        stream.log(f"{root}/{body}/{kind}", _solid(kind, alike, ghost), static=True)
+    colors = [BOOMS[k % len(BOOMS)][ghost] for k, _ in enumerate(rest.booms)]
+    look = rr.LineStrips3D.from_fields(colors=colors, radii=TUBE * (0.7 if ghost else 1.0))
+    stream.log(f"{root}/booms", look, static=True)
+    balls = [s for s in rest.shapes if s.body in {f"{boom}_tip_mass" for boom in rest.booms}]
+    if balls:
+        look = rr.Points3D.from_fields(
+            colors=[_rgba(s, ghost) for s in balls], radii=[s.size[0] for s in balls]
+        )
+        stream.log(f"{root}/tip_masses", look, static=True)
+    if rest.booms and not ghost:
+        carrier = bodies[0]
+        place, inverse = rest.positions[carrier][0], rest.quaternions[carrier][0] * (1, -1, -1, -1)
+        lines = [boom_points(rest, boom)[1][0][[0, -1]] - place for boom in rest.booms]
+        unbent = rr.LineStrips3D([turned(inverse, x) for x in lines], colors=GREY, radii=-0.8)
+        stream.log(f"{root}/{carrier}/unbent", unbent, static=True)
+
+
+def motion(stream: Stream, root: str, frames: Frames, rest: Drawing, bodies: Sequence[str]) -> None:
+    """Logs the poses of bodies and the bent booms.
+
+    Args:
+        stream: The recording.
+        root: Path of the flight's scene.
+        frames: The instants.
+        rest: The machine in its reference configuration.
+        bodies: The bodies that are drawn.
+    """
+    times = [rr.TimeColumn(TIMELINE, duration=frames.time)]
+    for body in bodies:
+        pose = rr.Transform3D.columns(
+            translation=frames.positions[body],
+            quaternion=np.roll(frames.quaternions[body], -1, axis=1),  # (w, ...) -> (..., w)
+        )
+        stream.send_columns(f"{root}/{body}", times, pose)
+    if not frames.booms:
+        return
+    lines, count = _together(list(frames.booms.values())), len(frames.booms)
+    strips = rr.LineStrips3D.columns(strips=lines).partition(np.full(len(frames.time), count))
+    stream.send_columns(f"{root}/booms", times, strips)
+    heavy = {s.body.removesuffix("_tip_mass") for s in rest.shapes if s.body.endswith("_tip_mass")}
+    if ends := [points[:, -1] for boom, points in frames.booms.items() if boom in heavy]:
+        at = np.stack(ends, axis=1).reshape(-1, 3)
+        counts = np.full(len(frames.time), len(ends))
+        places = rr.Points3D.columns(positions=at).partition(counts)
+        stream.send_columns(f"{root}/tip_masses", times, places)
+
+
+def _together(booms: list[Array]) -> Array:
+    """Lines of all booms, frame by frame, shape (n frames * n booms, n points, 3)."""
+    longest = max(points.shape[1] for points in booms)
+    padded = [np.pad(p, ((0, 0), (0, longest - p.shape[1]), (0, 0)), mode="edge") for p in booms]
+    return np.stack(padded, axis=1).reshape(-1, longest, 3).astype(np.float32)
+
+
+def drawn_bodies(rest: Drawing) -> list[str]:
+    """Returns the bodies that are drawn as solids or carry jets: all but the links of booms.
+
+    Args:
+        rest: The machine in its reference configuration.
+    """
+    links = {body for bodies in rest.booms.values() for body in bodies}
+    links |= {f"{boom}_tip_mass" for boom in rest.booms}
+    carriers = {jet.body for jet in rest.jets}
+    return [body for body in rest.positions if body not in links or body in carriers]
+
+
+def extent(rest: Drawing) -> float:
+    """Returns the distance of the farthest body origin or boom tip from the first body, m.
+
+    Args:
+        rest: The machine in its reference configuration.
+    """
+    origins = np.array([position[0] for position in rest.positions.values()])
+    tips = [boom_points(rest, boom)[0][0, -1] for boom in rest.booms]
+    shapes = [abs(s.position).max() + max(s.size) for s in rest.shapes]
+    reach = np.linalg.norm(np.array([*origins, *tips]) - origins[0], axis=1).max()
+    return float(max(reach, *shapes, 0.01))
+
+
+def nozzles(stream: Stream, root: str, rest: Drawing) -> dict[str, list[str]]:
+    """Logs the exhaust of every jet, still out, and returns the paths of each channel's plumes.
+
+    Args:
+        stream: The recording.
+        root: Path of the flight's scene.
+        rest: The machine in its reference configuration.
+    """
+    paths: dict[str, list[str]] = {}
+    for k, jet in enumerate(rest.jets):
+        for n, (point, force) in enumerate(_nozzles(jet, rest)):
+            path = f"{root}/{jet.body}/jets/{jet.channel}_{k}_{n}"
+            side = np.cross(force, np.eye(3)[np.argmin(np.abs(force))])
+            side /= np.linalg.norm(side)
+            frame = np.stack([side, np.cross(side, force), -force], axis=1)
+            stream.log(path, rr.Transform3D(translation=point, mat3x3=frame), static=True)
+            stream.log(f"{path}/plume", _cone(), static=True)
+            paths.setdefault(jet.channel, []).append(f"{path}/plume")
+    return paths
+
+
+def plumes(
+    stream: Stream, paths: Mapping[str, Sequence[str]], found: Sequence[Changes], size: float
+) -> None:
+    """Logs the plumes at the instants at which a thrust changes: longer at a higher level.
+
+    Args:
+        stream: The recording.
+        paths: Paths of the plumes of each channel.
+        found: The changes of commands and thrusts.
+        size: Length of the longest plume, m.
+    """
+    for change in found:
+        if change.what == "command" or not len(change.time):
+            continue
+        length = size * throttle(change.value, change.channel.thruster.levels)
+        length[length == 0] = 1e-6  # a transform must have an inverse
+        scale = np.stack([abs(length), abs(length), length], axis=1)
+        times = [rr.TimeColumn(TIMELINE, duration=change.time)]
+        for path in paths.get(change.channel.name, ()):
+            stream.send_columns(path, times, rr.Transform3D.columns(scale=scale))
+
+
+def throttle(thrust: Array, levels: Sequence[float]) -> Array:
+    """Returns the signed size from 0 to 1 of a thrust, on a log scale: its levels span decades.
+
+    Args:
+        thrust: The thrust, shape (n,), N or N m.
+        levels: The levels of its channel.
+    """
+    least, most = min(levels), max(levels)
+    share = np.log(np.maximum(np.abs(thrust), least) / least) / max(np.log(most / least), 1e-9)
+    return np.sign(thrust) * (0.5 + 0.5 * share if most > least else 1.0)
+
+
+def _nozzles(jet: Jet, rest: Drawing) -> list[tuple[Array, Array]]:
+    """Where a jet blows and the direction of its force; a pure torque is drawn as a pair."""
+    if np.any(jet.force):
+        return [(jet.position, jet.force / np.linalg.norm(jet.force))]
+    axis = jet.torque / np.linalg.norm(jet.torque)
+    shapes = [shape for shape in rest.shapes if shape.body == jet.body]
+    reach = max((max(np.abs(s.position)) + max(s.size) for s in shapes), default=1.0)
+    arm = reach * np.eye(3)[0 if abs(axis[0]) < 0.9 else 1]
+    force = np.cross(axis, arm) / np.linalg.norm(np.cross(axis, arm))
+    return [(jet.position + arm, force), (jet.position - arm, -force)]
+
+
+def _solid(kind: str, shapes: Sequence[Shape], ghost: bool) -> rr.AsComponents:
+    size = np.array([shape.size for shape in shapes])
+    centre = np.array([shape.position for shape in shapes])
+    turn = np.array([shape.quaternion for shape in shapes])
+    radius, length = size[:, 0], 2 * size[:, 1]
+    look = {
+        "quaternions": np.roll(turn, -1, axis=1),  # (w, x, y, z) -> (x, y, z, w)
+        "colors": np.array([_rgba(shape, ghost) for shape in shapes], np.uint8),
+        "fill_mode": "solid",
+    }
+    if kind in ("capsule", "sphere"):  # a sphere is a capsule of no length
+        # A capsule starts at its origin here; MuJoCo's origin is its middle.
+        start = centre - size[:, 1:2] * turned(turn, np.array([0.0, 0.0, 1.0]))
+        return rr.Capsules3D(radii=radius, lengths=length, translations=start, **look)
+    if kind == "cylinder":
+        return rr.Cylinders3D(radii=radius, lengths=length, centers=centre, **look)
+    if kind == "box":
+        return rr.Boxes3D(half_sizes=size, centers=centre, **look)
+    return rr.Ellipsoids3D(half_sizes=size, centers=centre, **look)
+
+
+def _rgba(shape: Shape, ghost: bool) -> list[int]:
+    red, green, blue, alpha = (round(255 * x) for x in shape.rgba)
+    return [red, green, blue, GHOST if ghost else alpha]
+
+
+def _cone(sides: int = 16) -> rr.Mesh3D:
+    """A plume of unit length along z, bright at the nozzle and fading."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    circle = np.stack([0.13 * np.cos(angle), 0.13 * np.sin(angle), np.ones(sides)], axis=1)
+    rim = 1 + np.arange(sides)
+    return rr.Mesh3D(
+        vertex_positions=np.vstack([np.zeros(3), circle]),
+        triangle_indices=np.stack([np.zeros(sides, int), rim, np.roll(rim, -1)], axis=1),
+        vertex_colors=np.array([(255, 226, 130, 255)] + sides * [(255, 96, 20, 40)], np.uint8),
+    )

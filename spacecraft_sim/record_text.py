@@ -1,0 +1,75 @@
+"""The documents of a recording: verdicts, scenario, what is drawn; Markdown as plain text.
+
+Words, not marks: the viewer panics on a glyph that its font lacks, as the cross.
+"""
+
+from collections.abc import Sequence
+
+from spacecraft_sim.guarantee import Verdict
+
+
+def verdict_page(title: str, verdicts: Sequence[Verdict], notes: Sequence[str]) -> str:
+    """Returns what became of the claims, as Markdown.
+
+    Args:
+        title: Title of the scenario.
+        verdicts: The verdicts.
+        notes: What is to be said of the recording itself.
+    """
+    kept = sum(v.holds for v in verdicts)
+    fails = f", **{len(verdicts) - kept} FAIL**" if kept < len(verdicts) else ""
+    head = [f"# {kept} of {len(verdicts)} claims hold{fails}", f"{title}", ""]
+    return "\n".join([*head, *verdict_table(verdicts), *_failed(verdicts), "", *notes])
+
+
+def unjudged_page(title: str, notes: Sequence[str]) -> str:
+    """Returns what stands in place of the verdicts until a flight has come to its end.
+
+    Args:
+        title: Title of the scenario.
+        notes: What is to be said of the recording itself.
+    """
+    text = "The flight has not come to its end: nothing is judged."
+    return "\n".join(["# Not judged", title, "", text, "", *notes])
+
+
+def verdict_table(verdicts: Sequence[Verdict]) -> list[str]:
+    """Returns the lines of a Markdown table of verdicts.
+
+    Args:
+        verdicts: The verdicts.
+    """
+    lines = ["|  | claim | predicted | measured | bound | margin | worst at | source |"]
+    lines.append("|:-:|:--|--:|--:|--:|--:|--:|:--|")
+    for v in verdicts:
+        claim = f"{'holds' if v.holds else '**FAILS**'} | {cell(v.claim)}"
+        expected = "" if v.predicted is None else f"{v.predicted:.4g}"
+        bound = f"{'±' if v.kind == 'within' else '≤ '}{v.bound:.3g} {v.unit}"
+        worst = "" if v.t_worst is None else f"{v.t_worst:.2f} s"
+        figures = f"{expected} | {v.measured:.4g} | {bound} | {100 * v.margin:.3g} % | {worst}"
+        lines.append(f"| {claim} | {figures} | {cell(v.source)} |")
+    return lines
+
+
+def scenario_page(toml: str) -> str:
+    """Returns a scenario as Markdown.
+
+    Args:
+        toml: The scenario, as text.
+    """
+    return f"```toml\n{toml.strip()}\n```"
+
+
+def cell(text: str) -> str:
+    """Returns a text as it may stand in a cell of a Markdown table.
+
+    Args:
+        text: The text.
+    """
+    return text.replace("|", "\\|")
+
+
+def _failed(verdicts: Sequence[Verdict]) -> list[str]:
+    failed = sorted({str(assumption) for v in verdicts for assumption in v.failed})
+    heading = ["", "**Assumptions that do not hold**", ""]
+    return [*heading, *(f"- `{text}`" for text in failed)] if failed else []

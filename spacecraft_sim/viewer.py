@@ -1,0 +1,110 @@
+"""A viewer on this machine to which a recording is sent while it is made; loopback only."""
+
+import ipaddress
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+
+PORT = 9876  # where a viewer listens unless told otherwise
+_SCHEME, _PATH = "rerun+http://", "/proxy"
+
+
+def found(text: str | None) -> str | None:
+    """Returns the full address of a viewer that listens.
+
+    Args:
+        text: `host:port`, a port, a full address, or nothing for the usual port; None for no
+            viewer.
+
+    Raises:
+        ValueError: If the address is not of this machine, or nobody listens there.
+    """
+    if text is None:
+        return None
+    host, port = _place(text)
+    if not _listens(host, port):
+        raise ValueError(
+            f"--connect {text}: no viewer listens on {host}, port {port}; open one with "
+            f"'rerun --bind 127.0.0.1 --port {port}', or use --spawn"
+        )
+    return _address(host, port)
+
+
+def spawn(options: Sequence[str] = (), patience: float = 30.0) -> str:
+    """Opens a viewer that listens on this machine alone and outlives this program.
+
+    Args:
+        options: Further words for the viewer.
+        patience: How long it may take to listen, s.
+
+    Returns:
+        Its full address.
+
+    Raises:
+        ValueError: If it does not come to listen.
+    """
+    host, port = "127.0.0.1", PORT
+    if _listens(host, port):
+        port = _free_port(host)
+    # Left to itself the viewer listens on all addresses.
+    words = ["--bind", host, "--port", str(port), "--expect-data-soon", *options]
+    started = subprocess.Popen(
+        [sys.executable, "-m", "rerun_cli", *words],
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    end = time.monotonic() + patience
+    while not _listens(host, port):
+        if (code := started.poll()) is not None:
+            raise ValueError(f"--spawn: the viewer ended with code {code}; is there a display?")
+        if time.monotonic() > end:
+            started.terminate()
+            raise ValueError(f"--spawn: the viewer does not listen after {patience:g} s")
+        time.sleep(0.05)
+    return _address(host, port)
+
+
+def _place(text: str) -> tuple[str, int]:
+    """Host and port of an address in any of its forms."""
+    bare = text.removeprefix(_SCHEME).removesuffix(_PATH)
+    host, colon, port = bare.rpartition(":")
+    if not colon:
+        host, port = ("", bare) if bare.isdecimal() else (bare, "")
+    host = host.strip("[]")
+    host = "127.0.0.1" if host in ("", "localhost") else host
+    try:
+        loopback = ipaddress.ip_address(host).is_loopback
+        number = int(port or PORT)
+    except ValueError:
+        raise ValueError(
+            f"--connect {text}: not an address; give host:port, such as 127.0.0.1:{PORT}"
+        ) from None
+    if not loopback:
+        raise ValueError(
+            f"--connect {text}: {host} is another machine; recordings are sent to viewers on this "
+            f"one alone, such as 127.0.0.1:{number}"
+        )
+    if not 0 < number < 65536:
+        raise ValueError(f"--connect {text}: port {number} is not between 1 and 65535")
+    return host, number
+
+
+def _address(host: str, port: int) -> str:
+    return f"{_SCHEME}{f'[{host}]' if ':' in host else host}:{port}{_PATH}"
+
+
+def _listens(host: str, port: int) -> bool:
+    try:
+        socket.create_connection((host, port), timeout=1.0).close()
+    except OSError:
+        return False
+    return True
+
+
+def _free_port(host: str) -> int:
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return probe.getsockname()[1]
