@@ -14,7 +14,8 @@ pause,
 
 Newton's method solves for edges and l at once; eliminating the edges would leave the Jacobian
 sum (e_(j-1) - e_j)^2 h h^T/|h_l'|, which is infinite where two edges meet.  A pattern is accepted
-only if its moments are met and l proves, by duality, that no control is better.
+only if its moments are met and l proves, by duality, that no control is better by 1e-10; by 1e-7
+if rounding lets no grid do better.
 """
 
 from collections.abc import Callable
@@ -28,11 +29,11 @@ from controllers.moment_problem import Problem, with_ends
 from controllers.moments import Array
 
 GAP = 1e-10  # between the cost of a control and its lower bound, relative
-_LOOSE = 1e-7  # nor is a gap above this accepted where rounding alone opens it
+_LOOSE = 1e-7  # the gap that is accepted where rounding keeps it open
 _ROUNDS = 10  # of refining the grid of the linear program
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Extremal:
     """A control between levels of one size.
 
@@ -162,10 +163,9 @@ def _with_pauses(problem: Problem, peak: Extremal, bound: float) -> Guess:
 
 def _search(problem: Problem, kind: _Kind) -> Extremal:
     """Solves on a grid, then exactly; refines the grid where that shows it to be too coarse."""
-    fastest = int(max(problem.modes.omega))
-    nodes = np.linspace(0, 1, 97 + min(fastest, 400))
-    most = 4 * len(problem.target) + fastest  # more edges are noise about zero
-    best = None
+    nodes, best = problem.grid(), None
+    # More edges are rounding errors about zero.
+    most = 4 * len(problem.target) + int(max(problem.modes.omega))
     for _ in range(_ROUNDS):
         primal = kind.program(nodes)
         lam = primal.multipliers

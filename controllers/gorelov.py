@@ -56,6 +56,7 @@ def min_energy(
     Raises:
         ValueError: If a number is out of range, a mode is not underdamped, or the manoeuvre is
             empty.
+        ArithmeticError: If the moments cannot be told apart in double precision.
     """
     return smooth_plan(_problem(omega, damping, duration, x0, v0, x1, v1))
 
@@ -84,6 +85,7 @@ def min_peak(
     Raises:
         ValueError: If a number is out of range, a mode is not underdamped, or the manoeuvre is
             empty.
+        ArithmeticError: If the moments cannot be told apart in double precision.
     """
     task = _problem(omega, damping, duration, x0, v0, x1, v1)
     best = least_peak(task)
@@ -116,6 +118,7 @@ def min_fuel(
     Raises:
         ValueError: If a number is out of range, a mode is not underdamped, the manoeuvre is
             empty, or the bound is below the least peak for this duration.
+        ArithmeticError: If the moments cannot be told apart in double precision.
     """
     positive(bound=bound)
     task = _problem(omega, damping, duration, x0, v0, x1, v1)
@@ -162,6 +165,7 @@ def min_time(
     Raises:
         ValueError: If a number is out of range, a mode is not underdamped, or the manoeuvre is
             empty.
+        ArithmeticError: If the moments cannot be told apart in double precision.
     """
     positive(bound=bound)
     finite(x0=x0, v0=v0, x1=x1, v1=v1)

@@ -69,7 +69,7 @@ def impulse_limit(
     """
     modes = modes_of(omega, damping)
     problem = problem_of(modes, duration=duration, x0=x0, v0=v0, x1=x1, v1=v1)
-    nodes = np.linspace(0, 1, 97 + int(max(problem.modes.omega)))
+    nodes = problem.grid()
     gap = np.inf
     for _ in range(_ROUNDS):
         rough = _on_grid(problem, nodes)

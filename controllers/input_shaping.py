@@ -250,12 +250,13 @@ def _shaped(
     finite(x0=x0, x1=x1)
     shaper = reduce(Shaper.convolved, shapers, NONE)
     length, way = shaper.length, x1 - x0
-    if (duration is None) == (bound is None):
-        raise ValueError(f"give duration or bound, not both: got {duration!r} and {bound!r}")
-    if duration is None:
-        assert bound is not None
+    if duration is None and bound is not None:
         positive(bound=bound)
-        duration = 2 * math.sqrt(abs(way) / bound) + length or 1.0  # an empty one is refused below
+        duration = 2 * math.sqrt(abs(way) / bound) + length
+    elif duration is None or bound is not None:
+        raise ValueError(f"give duration or bound, one of them: got {duration!r} and {bound!r}")
+    if way == 0:
+        raise ValueError(f"the manoeuvre is empty: it goes from x = {x0:.9g} to x = {x1:.9g}")
     c = targets(modes, duration=duration, x0=x0, v0=0.0, x1=x1, v1=0.0)
     if duration <= length:
         raise ValueError(

@@ -48,6 +48,10 @@ class Problem:
     chosen: Array
     target: Array
 
+    def grid(self) -> Array:
+        """Returns nodes over [0, 1] for a first linear program."""
+        return np.linspace(0, 1, 97 + min(int(max(self.modes.omega)), 400))
+
     def functions(self, s: Array | float) -> Array:
         """Returns q(s), shape (2 + 2 modes, *s.shape).
 

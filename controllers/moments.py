@@ -29,7 +29,7 @@ from spacecraft_sim.checks import positive
 from spacecraft_sim.curve import Curve
 
 Array = np.ndarray
-Numbers = float | Sequence[float]
+Numbers = float | Sequence[float] | np.ndarray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -315,7 +315,7 @@ def _taylor(w2: Array, b: Array, s: Array) -> tuple[Array, Array]:
 
 
 def _numbers(values: Numbers) -> tuple[float, ...]:
-    return tuple(float(x) for x in np.atleast_1d(np.asarray(values, dtype=float)))
+    return tuple(np.asarray(values, dtype=float).ravel().tolist())
 
 
 def _columns(s: Array, values: Sequence[float] | Array) -> Array:

@@ -41,7 +41,7 @@ def one_signed(problem: Problem, bound: float) -> tuple[Array, Array] | None:
     if centred.unit * least.peak > problem.unit * bound / 2:
         return None
     forward = problem.shifted(sign=sign, offset=0.0)
-    nodes = np.union1d(np.linspace(0, 1, 97 + int(max(problem.modes.omega))), least.edges)
+    nodes = np.union1d(problem.grid(), least.edges)
     for _ in range(_ROUNDS):
         guess = one_signed_guess(forward, bound, nodes)
         h = forward.curve(guess.multipliers)

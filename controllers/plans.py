@@ -203,7 +203,7 @@ def smooth_plan(problem: Problem) -> SmoothPlan:
     )
 
 
-def residual_vibration(plan: Plan, *, omega: Array | Numbers, damping: Array | Numbers) -> Array:
+def residual_vibration(plan: Plan, *, omega: Numbers, damping: Numbers) -> Array:
     """Returns the amplitude that a plan leaves a mode with: sqrt(y^2 + ((y' + b y/2)/beta)^2).
 
     The mode y'' + b y' + w^2 y = u is at rest at first; left alone at the end, y e^(b t/2) swings

@@ -1,9 +1,9 @@
 """Flights of smooth laws on equations of motion: sampled, as laws are flown, or in continuous time.
 
-In a sampled flight the law is the very object that flies elsewhere, and its torques are held between
-samples; the pieces are short, and scipy's RK45 is the fastest for them.  The continuous-time loop,
-which no machine flies but the theorems speak of, takes the law's formula apart from its sampling;
-it is integrated by DOP853.  Both keep to the same tolerances.
+In a sampled flight the law is the very object that flies elsewhere, and its torques are held
+between samples; the pieces are short, and scipy's RK45 is the fastest for them.  The loop in
+continuous time, which no machine flies but the theorems speak of, takes the law's formula apart
+from its sampling; it is integrated by DOP853.  Both keep to the same tolerances.
 """
 
 import math

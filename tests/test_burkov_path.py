@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers import burkov
-from controllers.burkov_path import Replanning, frozen_poles
+from controllers.burkov_path import Replanning, frozen_loops
 from controllers.programmes import Harmonic, Return
 from spacecraft_sim.controller import Controller
 from spacecraft_sim.smooth_flight import fly, fly_continuous
@@ -90,7 +90,7 @@ def test_the_hold_of_the_feedforward_is_counted():
         (run,) = fly(ARM, law, starts=start((0, 0)), duration=7.0)
         verdict = claim.check(run)
         assert verdict.holds
-        assert 0.5 < verdict.measured / verdict.bound
+        assert verdict.measured > 0.5 * verdict.bound
 
 
 def test_a_path_that_stands_still_is_a_position():
@@ -114,6 +114,7 @@ def test_a_path_that_stands_still_is_a_position():
 TUBE = {25.0: 0.1607, 50.0: 0.0889, 100.0: 0.0468, 200.0: 0.0240, 400.0: 0.0121}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gamma", TUBE)
 def test_the_tube_shrinks_as_the_gain_grows(gamma):
     law, (claim,) = cases.path(gamma=gamma, feedforward=False)
@@ -135,6 +136,7 @@ def test_the_bound_of_the_tube():
 DISTURBED = {50.0: 0.0933, 100.0: 0.0496, 200.0: 0.0256}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gamma", DISTURBED)
 def test_the_tube_under_a_bounded_disturbance(gamma):
     law, _ = cases.path(gamma=gamma, feedforward=False)
@@ -196,7 +198,7 @@ def test_the_rate_of_the_new_path_is_that_of_the_filter():
     assert isinstance(law, Controller)
     (run,) = fly(
         ARM, law, starts=start((0, 0)), duration=6.0,
-        disturbance=lambda t: [80.0 if 2.0 <= t < 2.4 else 0.0, 0.0],
+        disturbance=lambda t: [100.0 if 2.0 <= t < 2.4 else 0.0, 0.0],
     )  # fmt: skip
     memory, found = law.init(), None
     readings = cases.named(run, law.sensors)
@@ -266,8 +268,8 @@ def test_bad_programmes_are_refused(changes, words):
         replace(PROGRAMME, **changes)
 
 
-def test_frozen_poles_are_of_paths_alone():
+def test_frozen_loops_are_of_paths_alone():
     law, _ = cases.path()
-    assert frozen_poles(law, ARM, [0.0, 1.0]).shape == (2, 6)
+    assert len(frozen_loops(law, ARM, [0.0, 1.0])) == 2
     with pytest.raises(ValueError, match="follows no path: it is a Position"):
-        frozen_poles(cases.position()[0], ARM, [0.0])
+        frozen_loops(cases.position()[0], ARM, [0.0])

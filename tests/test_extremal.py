@@ -1,4 +1,4 @@
-"""Least peak and least fuel: duality, discretised rivals, degenerate and nearly degenerate cases."""
+"""Least peak and least fuel: duality, discretised rivals, degenerate cases and those close by."""
 
 import math
 
@@ -97,7 +97,7 @@ def test_a_control_constant_on_cells_does_no_better(name):
     assert -1e-6 < cells.fun / fuel - 1 < 1e-4
 
 
-# -- degenerate cases ----------------------------------------------------------------------------------
+# -- degenerate cases ------------------------------------------------------------------------------
 
 
 def test_one_switching_where_there_are_four_moments():
@@ -163,7 +163,7 @@ def test_much_more_than_the_least_peak(ratio):
 
 @pytest.mark.parametrize("turns", [0.02, 0.1, 0.3, 1.0])
 def test_short_beside_the_period(turns):
-    """As w T goes to 0, x follows w^2 u by four integrations: m* w^2 T^4 = 4^3 3!, Chebyshev edges."""
+    """As w T goes to 0 there are four integrations of u: m* w^2 T^4 = 4^3 3!, Chebyshev edges."""
     plan = min_peak(omega=turns / 7, damping=0.0, duration=7.0, x1=1.0)
     assert plan.peak * 49 * turns**2 == pytest.approx(384, rel=turns**2 / 100)
     chebyshev = 7 / 2 * (1 - np.cos(np.pi * np.array([1, 2, 3]) / 4))

@@ -298,9 +298,8 @@ def coupled(plan, rate=0.0):
 
     def rates(t, state, u):
         _, bus, q, slope = state
-        return [bus, 0.0, slope, 0.0] + np.insert(
-            np.linalg.solve(M, [u, -B * slope - C * q]), [0, 1], 0.0
-        )
+        acceleration, bend = np.linalg.solve(M, [u, -B * slope - C * q])
+        return [bus, acceleration, slope, bend]
 
     state, largest = np.array([0.0, rate, 0.0, 0.0]), 0.0
     times = [0.0, *plan.switch_times, plan.duration]
@@ -342,7 +341,7 @@ def test_a_spin_up_ends_without_vibration():
     assert not plan.normal
 
 
-# -- what is left off the nominal frequency ------------------------------------------------------------
+# -- what is left off the nominal frequency --------------------------------------------------------
 
 OFF = np.array([-0.2, -0.1, -0.05, 0.05, 0.1, 0.2])
 ROBUSTNESS = [

@@ -35,7 +35,7 @@ def test_one_impulse_each_way_over_whole_periods():
     assert limit.fuel == pytest.approx(2 / T, rel=1e-10)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     st.floats(0.3, 6), st.floats(0, 0.8), st.floats(2, 15), st.floats(-0.2, 0.2),
     st.floats(-0.2, 0.2),

@@ -205,14 +205,14 @@ def test_steps_that_meet_are_one():
     assert plan.levels[1] == 0.0
 
 
-# -- bad input ---------------------------------------------------------------------------------------
+# -- bad input -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", PLANS)
 def test_bad_input(kind):
     plan = PLANS[kind]
     for size in ({}, {"duration": 20.0, "bound": 1.0}):
-        with pytest.raises(ValueError, match="give duration or bound"):
+        with pytest.raises(ValueError, match="give duration or bound, one of them"):
             plan(**ASKED, **size)
     for size in ({"duration": 20.0}, {"bound": 1.0}):
         with pytest.raises(ValueError, match="the manoeuvre is empty"):

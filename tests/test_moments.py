@@ -40,6 +40,7 @@ def precise(w, b, s):
 # -- functions -----------------------------------------------------------------------------------
 
 
+@settings(max_examples=30)
 @given(FREQUENCIES, RATIOS)
 def test_the_functions_of_a_mode_solve_its_equation(w, zeta):
     modes = modes_of(w, 2 * zeta * w)
@@ -53,6 +54,7 @@ def test_the_functions_of_a_mode_solve_its_equation(w, zeta):
     assert modes.functions(0.0) == pytest.approx([0, 1, 0, 1])
 
 
+@settings(max_examples=25)
 @given(FREQUENCIES, RATIOS, st.floats(0.01, 10))
 def test_integrals_are_integrals(w, zeta, s):
     modes = modes_of(w, 2 * zeta * w)
@@ -106,6 +108,7 @@ def test_gram_matrix():
     assert np.linalg.det(gram(modes_of(2, 0.1), 6.0)[:2, :2]) == pytest.approx(108, rel=1e-12)
 
 
+@settings(max_examples=30)
 @given(FREQUENCIES, RATIOS, st.floats(0.1, 30))
 def test_gram_matrix_in_closed_form(w, zeta, T):
     modes = modes_of(w, 2 * zeta * w)
@@ -115,7 +118,7 @@ def test_gram_matrix_in_closed_form(w, zeta, T):
     assert G[2, 3] == pytest.approx(h3**2 / 2, abs=1e-12 / w)
     assert G[0, 3] == pytest.approx(T * h3 - modes.integrals(T)[2], abs=1e-11 * T / w)
     assert np.linalg.det(G[:2, :2]) == pytest.approx(T**4 / 12, rel=1e-10)
-    assert G == pytest.approx(G.T)
+    assert np.allclose(G, G.T, rtol=1e-13)
 
 
 def test_quadrature_is_exact_for_fast_modes():
