@@ -4,13 +4,17 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 SCENARIO ?= efremov-nonlocal
 
-.PHONY: run test test-slow lint benchmark clean
+.PHONY: run test test-slow lint benchmark browser clean
 
 run: $(VENV)/installed
 	$(BIN)/spacecraft-sim run $(SCENARIO)
 
-test: $(VENV)/installed-dev
+test: $(VENV)/installed-dev browser
 	$(BIN)/python -m pytest -n auto -m "not slow"
+
+# Tests of report.html open it in Chromium, and are skipped without it.
+browser:
+	@command -v chromium >/dev/null || (test $$(id -u) = 0 && command -v apt-get >/dev/null && apt-get install -qq -y --no-install-recommends chromium >/dev/null 2>&1) || echo "no chromium: tests of report.html in a browser are skipped"
 
 test-slow: $(VENV)/installed-dev
 	$(BIN)/python -m pytest -n auto -m slow

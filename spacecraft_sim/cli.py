@@ -1,4 +1,4 @@
-"""The command `spacecraft-sim`: list, explain, run, export.
+"""The command `spacecraft-sim`: list, explain, run, export, video, doctor.
 
 Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or bad input, 3 the run diverged or crashed.
 Heavy modules are imported by the commands that need them.
@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import Progress, TextColumn, TimeRemainingColumn
+from rich.markup import escape
+from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from spacecraft_sim.versions import require_supported_mujoco
@@ -81,6 +82,15 @@ def _parser() -> argparse.ArgumentParser:
     export = command(_export, "write the complete MJCF of a spacecraft as one file")
     export.add_argument("name", metavar="NAME", help="spacecraft or scenario, or path of its TOML")
     export.add_argument("file", type=Path, metavar="FILE.xml", help="file to write")
+    video = command(
+        _video, "render the flight in the folder of a run with MuJoCo, without a display"
+    )
+    video.add_argument("folder", type=Path, metavar="RUN_FOLDER", help="folder that `run` wrote")
+    video.add_argument("--camera", metavar="NAME", help="camera of the machine's scene.xml")
+    video.add_argument("--fps", type=float, default=25.0, help="frames a second; default 25")
+    video.add_argument("--speed", type=float, help="simulated over shown time; default: about 30 s")
+    video.add_argument("--out", type=Path, metavar="FILE", help=".webp or .mp4 file to write")
+    command(_doctor, "say what this machine can do, what is missing, and what to install")
     return parser
 
 
@@ -265,6 +275,40 @@ def _export(arguments: argparse.Namespace) -> int:
     except OSError as error:
         raise ValueError(f"{arguments.file}: cannot be written: {error.strerror}") from error
     _console().print(f"{arguments.file}: {machine.title}")
+    return HOLDS
+
+
+# -- video, doctor ---------------------------------------------------------------------------------
+
+
+def _video(arguments: argparse.Namespace) -> int:
+    from spacecraft_sim import video
+
+    console = Console(stderr=True)
+    columns = TextColumn("rendering"), MofNCompleteColumn(), TextColumn("frames")
+    watched = console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=not watched) as progress:
+        task = progress.add_task("", total=None)
+        written = video.write(
+            arguments.folder,
+            camera=arguments.camera,
+            fps=arguments.fps,
+            speed=arguments.speed,
+            out=arguments.out,
+            progress=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    _console().print(f"{written}: {written.stat().st_size / 1e6:.2f} MB", highlight=False)
+    return HOLDS
+
+
+def _doctor(_: argparse.Namespace) -> int:
+    from spacecraft_sim import doctor
+
+    table = Table("", "what", "found", "to do", box=None, pad_edge=False, header_style="bold")
+    marks = {"ok": "[green]ok[/]", "limited": "[yellow]limited[/]", "missing": "[red]missing[/]"}
+    for check in doctor.checks():
+        table.add_row(marks[check.state], check.subject, escape(check.found), escape(check.advice))
+    _console().print(table)
     return HOLDS
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spacecraft_sim.drawing import Drawing, Shape, boom_points, turned
+from spacecraft_sim.drawing import Drawing, Jet, Shape, boom_points, turned
 
 Array = np.ndarray
 
@@ -133,3 +133,42 @@ def exaggeration(lines: Sequence[tuple[Array, Array]]) -> float:
         off = np.linalg.norm(bent[:, -1] - straight[:, -1], axis=1)
         largest = max(largest, float((off / length).max()))
     return max(f for f in _FACTORS if f == 1 or f < 0.3 / largest)
+
+
+def exhausts(jet: Jet, shapes: Sequence[Shape], level: float) -> list[tuple[Array, Array]]:
+    """Returns where exhaust leaves a body and the unit vector along which it blows, in its frame.
+
+    A jet inside a hull blows from where its line of action comes out: the force is the same. A pure
+    torque is drawn as a pair, as far out as the hull reaches.
+
+    Args:
+        jet: The jet.
+        shapes: Shapes of the machine.
+        level: The thrust; its sign counts.
+    """
+    hulls = [shape for shape in shapes if shape.body == jet.body and shape.kind == "box"]
+    if np.any(jet.force):
+        pairs = [(jet.position, jet.force / np.linalg.norm(jet.force))]
+    else:
+        axis = jet.torque / np.linalg.norm(jet.torque)
+        reach = max((float(np.abs(surface(hull)).max()) for hull in hulls), default=1.0)
+        arm = reach * np.eye(3)[0 if abs(axis[0]) < 0.9 else 1]
+        force = np.cross(axis, arm) / np.linalg.norm(np.cross(axis, arm))
+        pairs = [(jet.position + arm, force), (jet.position - arm, -force)]
+    found = []
+    for point, force in pairs:
+        away = -np.sign(level) * force
+        found.append(
+            (point + max((_exit(h, point, away) for h in hulls), default=0.0) * away, away)
+        )
+    return found
+
+
+def _exit(hull: Shape, point: Array, way: Array) -> float:
+    """How far it is from a point inside a box to its surface; zero from a point outside."""
+    back = hull.quaternion * (1, -1, -1, -1)
+    p, d = turned(back, point - hull.position), turned(back, way)
+    if np.any(np.abs(p) > hull.size):
+        return 0.0
+    run = np.abs(d) > 1e-9
+    return float(((np.sign(d) * hull.size - p)[run] / d[run]).min())

@@ -42,7 +42,7 @@ def imports(path, module):
 
 
 ONLY_IN = {
-    "mujoco": {"mjcf", "readings", "physics", "linearize", "drawing", "elastic_mjcf"},
+    "mujoco": {"mjcf", "readings", "physics", "linearize", "drawing", "elastic_mjcf", "render"},
     "dm_control": {"physics", "reduced", "task", "simulate"},
     "rerun": {
         "record",
