@@ -57,7 +57,8 @@ def film(strip: list[Axes], drawing: Drawing, measured: Trajectory) -> str:
         when = f"t = {drawing.time[frame]:.1f} s"
         axes.set_title(when, loc="left", y=1.0, size=10, weight="bold", pad=4)
         axes.set_title(thrust, loc="right", y=1.0, size=9, color=SOFT, pad=4)
-    bending = f"; bending drawn × {factor:g}, dashed: unbent" if lines else ""
+    size = f"drawn × {factor:g}" if factor > 1 else "to scale"
+    bending = f"; bending {size}, dashed: unbent" if lines else ""
     return f"{view.words[0].upper()}{view.words[1:]}{bending}; arrows: thrust on the craft"
 
 

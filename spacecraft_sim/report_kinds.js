@@ -25,7 +25,7 @@
     let X, inverse, fit = false;
     const traces = spec.traces.map((trace) => {
       const look = key(shape.caption, trace.name, trace.tone, trace.dashed ? "dashed" : "", draw);
-      const value = element("span", { class: "value" }, look.found);
+      const value = element("span", trace.draw === "stem" ? {} : { class: "value" }, look.found);
       const path = element("path", { class: "trace", "data-name": trace.name,
         style: `--c: var(--${trace.tone})`, "stroke-width": trace.width }, shape.inside);
       if (trace.dashed) path.setAttribute("stroke-dasharray", "5 4");
@@ -189,7 +189,7 @@
     let window = null, X, Y, back; // null: what the figure asks for, or what fits the tracks
     const [regions, lines, tracks] = [spec.regions, spec.lines, spec.tracks].map((parts, n) =>
       parts.map((part) => {
-        const kind = ["fill", part.dashed ? "dashed" : "", ""][n];
+        const kind = ["fill solid", part.dashed ? "dashed" : "", ""][n];
         const look = part.name && !parts.slice(0, parts.indexOf(part)).some((p) => p.name === part.name)
           ? key(shape.caption, part.name, part.tone, kind, n ? () => draw() : undefined) : undefined;
         const path = element("path", { class: ["region", "trace", "trace"][n], "data-name": part.name,

@@ -18,6 +18,7 @@ ARGUMENTS = {
     "benchmark": ["--rounds", "1", "--span", "0.2", "--duration", "2.0"],
     "manoeuvres": ["--short", "--out", "manoeuvres.png"],
     "regulators": ["--short", "--duration", "20.0"],
+    "gallery": ["efremov-local", "--duration", "2.0", "--out", "gallery"],
     "reproduce": ["efremov", "--duration", "5.0", "--out", "figures"],
 }
 
