@@ -19,6 +19,7 @@ from spacecraft_sim.switching_curves import Curve, Region, Relay, curve
 
 TOLERANCE = 1e-11  # of the half width
 REACH = 0.25  # |xF - xA| over p in the correction of Example 2; the paper leaves it open
+_INTO = 100_000  # tolerances by which a triangle of finite time reaches into the contour
 _TIP = 1e-9  # share of v by which a strip is longer than the edge that it covers
 
 Part = tuple[float, float, float, float]  # low, x0, w, q as in `curve`
@@ -90,7 +91,7 @@ def example_1(c: Contour, *, guarded: bool = True, finite_time: bool = False) ->
         (0.0, c.p, 0.0, -1 / (2 * dm)),
         (c.A1.v, *K1),
     )
-    regions = _capture(c) if finite_time else ()
+    regions = _capture(c, guarded) if finite_time else ()
     return Relay(left=left, right=right, left_level=0, guarded=guarded, regions=regions)
 
 
@@ -129,12 +130,12 @@ def example_2(c: Contour, *, finite_time: bool = False, reach: float = REACH) ->
     return Relay(left=left, right=right, left_level=0, regions=regions)
 
 
-def _capture(c: Contour) -> tuple[Region, ...]:
+def _capture(c: Contour, guarded: bool) -> tuple[Region, ...]:
     """The correction of Example 1: triangles from which W1 or W2 is reached with the right level.
 
     A1 L1 C gets -1 if kappa1 > kappa2, A2 L2 K3 gets 0 if kappa1 < kappa2; closed, since the
-    extreme arcs run along C L1 and along L2 K3.  Along L2 K3, and along M2 A2, an arc of -1 as well
-    as an edge, the level stays: what crosses them is not to change twice.
+    extreme arcs run along C L1 and along L2 K3.  They run along the edges M1 A1 and M2 A2 too:
+    there the triangles reach a little into W1 and W2, so that such arcs clearly enter.
     """
     ap, am, dm, dp = c.rates
     larger = _larger_kappa(c)
@@ -142,19 +143,22 @@ def _capture(c: Contour) -> tuple[Region, ...]:
         X = c.C.x + c.C.v**2 / (2 * dp)
         lower = _line(c.p, -2, (-math.inf, X, 0.0, -1 / (2 * dp)))
         upper = _line(
-            c.p, 2, (-math.inf, -c.p, 0.0, 1 / (2 * ap)), (c.A1.v, c.p, 0.0, -1 / (2 * dm))
+            c.p, _INTO, (-math.inf, -c.p, 0.0, 1 / (2 * ap)), (c.A1.v, c.p, 0.0, -1 / (2 * dm))
         )
         return (Region(c.C.v, c.L1.v, lower, upper, -1),)
     if larger == 2:
-        E2, M2A2 = (-math.inf, -c.p, 0.0, 1 / (2 * am)), (c.p, 0.0, -1 / (2 * dp))
+        E2, M2A2 = (-math.inf, -c.p, 0.0, 1 / (2 * am)), (c.A2.v, c.p, 0.0, -1 / (2 * dp))
         inner = (-math.inf, c.inner_off, 0.0, 1 / (2 * ap))
+        upper = _line(c.p, 2, inner)
+        if guarded:
+            return (Region(c.L2.v, c.K3.v, _line(c.p, -_INTO, E2, M2A2), upper, 0),)
+        # What has crossed L2 K3 or M2 A2 is not to change again: there the level stays.
         tip = (1 - _TIP) * c.K3.v
-        triangle = (_line(c.p, 3, E2, (c.A2.v, *M2A2)), _line(c.p, 2, inner))
         along_inner = (_line(c.p, 1, inner), _line(c.p, 6, inner))
-        arc = (-math.inf, *M2A2)
+        arc = (-math.inf, *M2A2[1:])
         along_arc = (_line(c.p, -2, arc), _line(c.p, 100, arc))
         return (
-            Region(c.L2.v, c.K3.v, *triangle, 0),
+            Region(c.L2.v, c.K3.v, _line(c.p, 3, E2, M2A2), upper, 0),
             Region(c.L2.v, tip, *along_inner, None),
             Region(c.A2.v, tip, *along_arc, None),
         )

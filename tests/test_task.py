@@ -304,7 +304,7 @@ def test_a_relay_with_neither_delay_nor_period_is_refused():
             disturbance=Disturbance({}),
         )
 
-    with pytest.raises(ValueError, match=r"'thruster_z' has neither delay nor minimum on-time and the"):
+    with pytest.raises(ValueError, match="'thruster_z' has neither delay nor minimum"):
         task(None, 0.0)
     task(0.1, 0.0)
     task(None, 1e-3)
