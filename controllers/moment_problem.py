@@ -3,10 +3,9 @@
 Time is measured in durations and u in the root mean square of the control of least energy, so that
 the peaks of good controls are between 1 and a few.
 
-Where a manoeuvre is short beside the period of a mode, h_1 .. h_4 are nearly dependent.  There the
-responses of the mode to s and to 1 take the place of h_3 and h_4: with h_1 and h_2 they are
-combinations of these whose digits do not cancel.  Of the functions f so chosen, q = R^-T f are
-orthonormal over [0, 1].  Linear programs, Newton's method and controls of least energy use q.
+Where a manoeuvre is short beside the period of a mode, h_1 .. h_4 are nearly dependent.  Linear
+programs, Newton's method and controls of least energy work in q = R^-T h, with G = R^T R the Gram
+matrix, which are orthonormal over [0, 1].  Multipliers of q are l' = R l.
 """
 
 from bisect import bisect_right
@@ -19,7 +18,6 @@ from controllers.moments import (
     Modes,
     quadrature,
     share,
-    stacked,
     switched_moments,
     targets,
 )
@@ -34,9 +32,8 @@ class Problem:
         duration: T, s.
         unit: Unit of the control, N m or rad/s^2.
         modes: The modes, with T for the unit of time.
-        W: R^-T, q = W f.
+        W: R^-T, q = W h.
         moments: Moments wanted with h.
-        chosen: Moments wanted with f.
         target: Moments wanted with q; its length is 1.
     """
 
@@ -45,7 +42,6 @@ class Problem:
     modes: Modes
     W: Array
     moments: Array
-    chosen: Array
     target: Array
 
     def grid(self) -> Array:
@@ -58,7 +54,7 @@ class Problem:
         Args:
             s: Time to go.
         """
-        return np.tensordot(self.W, _chosen(self.modes, s)[1], 1)
+        return np.tensordot(self.W, self.modes.functions(s), 1)
 
     def slopes(self, s: Array | float) -> Array:
         """Returns dq/ds, like `functions`.
@@ -66,7 +62,7 @@ class Problem:
         Args:
             s: Time to go.
         """
-        return np.tensordot(self.W, _chosen(self.modes, s)[0], 1)
+        return np.tensordot(self.W, self.modes.slopes(s), 1)
 
     def integrals(self, s: Array | float) -> Array:
         """Returns the integral of q from 0 to s, like `functions`.
@@ -74,7 +70,7 @@ class Problem:
         Args:
             s: Time to go.
         """
-        return np.tensordot(self.W, _chosen(self.modes, s)[2], 1)
+        return np.tensordot(self.W, self.modes.integrals(s), 1)
 
     def of_switched(self, edges: Array, levels: Array) -> Array:
         """Returns the moments with q of a control that is constant between edges.
@@ -93,9 +89,9 @@ class Problem:
             levels: The control between them, one more.
             target_size: By what the moments wanted are multiplied.
         """
-        _, _, integrals = _chosen(self.modes, with_ends(edges))
+        got = switched_moments(self.modes, edges=with_ends(edges), levels=levels)
         # Digits cancel here, before the large entries of W come in.
-        return self.W @ (np.diff(integrals) @ levels - target_size * self.chosen)
+        return self.W @ (got - target_size * self.moments)
 
     def excess(self, s: Array, impulses: Array) -> Array:
         """Returns what impulses have too much of the moments wanted with q.
@@ -104,7 +100,7 @@ class Problem:
             s: Times to go.
             impulses: Their sizes.
         """
-        return self.W @ (_chosen(self.modes, s)[1] @ impulses - self.chosen)
+        return self.W @ (self.modes.functions(s) @ impulses - self.moments)
 
     def curve(self, own: Array) -> Curve:
         """Returns the sum of l'_k q_k as a curve over the time to go.
@@ -112,7 +108,7 @@ class Problem:
         Args:
             own: l', the multipliers of q.
         """
-        return self.modes.curve(self._of_h(own))
+        return self.modes.curve(self.W.T @ own)
 
     def crossings(
         self, own: Array, thresholds: tuple[float, ...], values: tuple[float, ...]
@@ -153,15 +149,9 @@ class Problem:
             offset: In this problem's unit.
         """
         moments = sign * self.moments - offset * self.modes.integrals(1.0)
-        chosen = sign * self.chosen - offset * _chosen(self.modes, 1.0)[2]
-        size = float(np.linalg.norm(self.W @ chosen))
-        return replace(
-            self,
-            unit=self.unit * size,
-            moments=moments / size,
-            chosen=chosen / size,
-            target=self.W @ chosen / size,
-        )
+        size = float(np.linalg.norm(self.W @ moments))
+        moments /= size
+        return replace(self, unit=self.unit * size, moments=moments, target=self.W @ moments)
 
     def multipliers(self, own: Array) -> Array:
         """Returns l for h_1, h_2, h_3, h_4 in s, 1, s, 1: h_l is the sum of l'_k q_k.
@@ -171,7 +161,7 @@ class Problem:
         """
         times = np.ones_like(own)
         times[0], times[2::2] = self.duration, self.duration
-        return self._of_h(own) / times
+        return (self.W.T @ own) / times
 
     def constant(self, value: float) -> Array:
         """Returns the multipliers of q for which h_l is constant.
@@ -180,24 +170,6 @@ class Problem:
             value: The constant.
         """
         return np.linalg.solve(self.W.T, value * np.eye(len(self.target))[1])
-
-    def _of_h(self, own: Array) -> Array:
-        """Multipliers of h, in own units."""
-        lam = self.W.T @ own
-        w2, b, slow = (
-            np.array(self.modes.omega) ** 2,
-            np.array(self.modes.damping),
-            _slow(self.modes),
-        )
-        # w^2 ramp = h_1 - h_3 - b step, w^2 step = h_2 - h_4 - b h_3.
-        ramp = lam[2::2] / w2
-        step = (lam[3::2] - b * ramp) / w2
-        out = lam.copy()
-        out[0] += ramp @ slow
-        out[1] += step @ slow
-        out[2::2] = np.where(slow, -ramp - b * step, lam[2::2])
-        out[3::2] = np.where(slow, -step, lam[3::2])
-        return out
 
 
 def problem_of(
@@ -220,19 +192,14 @@ def problem_of(
     c[0] /= duration
     own = modes.scaled(duration)
     s, weights = quadrature(own, 1.0)
-    _, f, _ = _chosen(own, s)
-    size = np.max(np.abs(f), axis=1)
+    h = own.functions(s)
+    size = np.max(np.abs(h), axis=1)
     # From the functions and not from their Gram matrix, whose root loses half of the digits.
-    R = np.linalg.qr((f / size[:, None] * np.sqrt(weights)).T, mode="r")
+    R = np.linalg.qr((h / size[:, None] * np.sqrt(weights)).T, mode="r")
     W = np.linalg.inv(R).T / size
-    w2, b, slow = np.array(own.omega) ** 2, np.array(own.damping), _slow(own)
-    step = slow * c[1] / w2
-    chosen = stacked(c[0], c[1], (slow * c[0] - b * step) / w2, step)
-    unit = float(np.linalg.norm(W @ chosen))
-    c, chosen = c / unit, chosen / unit
-    return Problem(
-        duration=duration, unit=unit, modes=own, W=W, moments=c, chosen=chosen, target=W @ chosen
-    )
+    unit = float(np.linalg.norm(W @ c))
+    c /= unit
+    return Problem(duration=duration, unit=unit, modes=own, W=W, moments=c, target=W @ c)
 
 
 def crossings(
@@ -274,25 +241,3 @@ def with_ends(edges: Array) -> Array:
         edges: Times to go in (0, 1).
     """
     return np.concatenate([[0.0], edges, [1.0]])
-
-
-def _slow(modes: Modes) -> Array:
-    """Modes that turn by less than 4 rad in the manoeuvre."""
-    return np.array(modes.omega) < 4
-
-
-def _chosen(modes: Modes, s: Array | float) -> tuple[Array, Array, Array]:
-    """Slopes, values and integrals of f: s, 1, then h_3, h_4 or the responses to s, 1."""
-    s = np.asarray(s, dtype=float)
-    y = modes.responses(s)
-    w, b, slow = (
-        x.reshape(-1, *(1,) * s.ndim)
-        for x in (np.array(modes.omega), np.array(modes.damping), _slow(modes))
-    )
-    h4, h3, step, ramp, parabola = y
-    one, zero = np.ones_like(s), np.zeros_like(s)
-    return (
-        stacked(one, zero, np.where(slow, step, h4), np.where(slow, h3, -w * w * h3 - b * h4)),
-        stacked(s, one, np.where(slow, ramp, h3), np.where(slow, step, h4)),
-        stacked(s * s / 2, s, np.where(slow, parabola, step), np.where(slow, ramp, h3)),
-    )

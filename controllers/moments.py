@@ -89,43 +89,36 @@ class Modes:
         """
         s = np.asarray(s, dtype=float)
         h3, h4 = self._pairs(s)
-        return stacked(s, np.ones_like(s), h3, h4)
+        return _stacked(s, np.ones_like(s), h3, h4)
+
+    def slopes(self, s: Array | float) -> Array:
+        """Returns dh/ds of each moment function, like `functions`.
+
+        Args:
+            s: Time to go, s.
+        """
+        s = np.asarray(s, dtype=float)
+        h3, h4 = self._pairs(s)
+        w, b = _columns(s, self.omega), _columns(s, self.damping)
+        return _stacked(np.ones_like(s), np.zeros_like(s), h4, -w * w * h3 - b * h4)
 
     def integrals(self, s: Array | float) -> Array:
         """Returns the integral of each moment function from 0 to s, like `functions`.
 
-        Args:
-            s: Time to go, s.
-        """
-        s = np.asarray(s, dtype=float)
-        _, h3, step, _, _ = self.responses(s)
-        return stacked(s * s / 2, s, step, h3)
-
-    def responses(self, s: Array | float) -> Array:
-        """Returns h_4, h_3 and three further integrals of each mode, shape (5, modes, *s.shape).
-
-        The last three are the responses to 1, s and s^2/2, each the integral of the one before.
-        Where a mode is slow beside the times, they come from a series, for differences cancel.
+        That of h_3 is the response to a step, (1 - h_4 - b h_3)/w^2; while the mode has turned by
+        less than 1 rad it comes from a series, for the difference would cancel.
 
         Args:
             s: Time to go, s.
         """
         s = np.asarray(s, dtype=float)
-        w2, b = _columns(s, self.omega) ** 2, _columns(s, self.damping)
         h3, h4 = self._pairs(s)
-        # y_j = response to s^j/j!: w^2 y_j = s^j/j! - y_(j-2) - b y_(j-1), y_-1 = h_3, y_-2 = h_4.
-        step = (1 - h4 - b * h3) / w2
-        ramp = (s - h3 - b * step) / w2
-        parabola = (s * s / 2 - step - b * ramp) / w2
-        turns = np.sqrt(w2) * s
-        cancels = (turns < 1) & (
-            np.max(turns, axis=tuple(range(1, turns.ndim)), keepdims=True, initial=0.0) < 4
-        )
-        if np.any(cancels):
-            W2, B, t = (np.broadcast_to(x, turns.shape)[cancels] for x in (w2, b, s))
-            parabola[cancels], ramp[cancels] = y, rate = _taylor(W2, B, t)
-            step[cancels] = t * t / 2 - B * rate - W2 * y
-        return np.stack([h4, h3, step, ramp, parabola])
+        w, b = _columns(s, self.omega), _columns(s, self.damping)
+        step = (1 - h4 - b * h3) / (w * w)
+        early = w * s < 1
+        if np.any(early & (w * np.max(s, initial=0.0) < 4)):  # else it is small beside the rest
+            step[early] = _step_series(*(np.broadcast_to(x, step.shape)[early] for x in (w, b, s)))
+        return _stacked(s * s / 2, s, step, h3)
 
     def curve(self, multipliers: Array) -> Curve:
         """Returns h_l = sum l_k h_k as a curve over the time to go.
@@ -277,22 +270,8 @@ def share(modes: Modes, error: Array, c: Array, duration: float) -> float:
         duration: T, s.
     """
     times = np.minimum(duration, 1 / np.array(modes.omega))
-    scale = stacked(np.array(duration**2), np.array(duration), times**2, times)
+    scale = _stacked(np.array(duration**2), np.array(duration), times**2, times)
     return float(np.max(np.abs(error) / scale) / np.max(np.abs(c) / scale))
-
-
-def stacked(first: Array, second: Array, thirds: Array, fourths: Array) -> Array:
-    """Returns the rigid rows, then the rows of each mode in turn.
-
-    Args:
-        first: Row of x.
-        second: Row of x'.
-        thirds: A row for each mode.
-        fourths: A second row for each mode.
-    """
-    out = np.empty((2 + 2 * len(thirds), *first.shape))
-    out[0], out[1], out[2::2], out[3::2] = first, second, thirds, fourths
-    return out
 
 
 @functools.cache
@@ -302,16 +281,15 @@ def _legendre() -> tuple[Array, Array]:
     return (1 + x) / 2, weights / 2
 
 
-def _taylor(w2: Array, b: Array, s: Array) -> tuple[Array, Array]:
-    """Response to s^2/2 and its rate from the series a_j s^j, for w s < 1 and b < 2 w."""
-    a = [np.full_like(s, 1 / 24), -b / 120]
-    for j in range(6, 26):  # |a_j s^j| < 2^j/j!
-        a.append(-(b * (j - 1) * a[-1] + w2 * a[-2]) / (j * (j - 1)))
-    value = rate = np.zeros_like(s)
-    for j in range(25, 3, -1):
-        value = value * s + a[j - 4]
-        rate = rate * s + j * a[j - 4]
-    return value * s**4, rate * s**3
+def _step_series(w: Array, b: Array, s: Array) -> Array:
+    """Response to a step as the series of a_j s^j, for w s < 1 and b < 2 w."""
+    a = [np.full_like(s, 0.5), -b / 6]
+    for j in range(4, 24):  # |a_j s^j| < 2^j/j!
+        a.append(-(b * (j - 1) * a[-1] + w * w * a[-2]) / (j * (j - 1)))
+    value = np.zeros_like(s)
+    for coefficient in reversed(a):
+        value = value * s + coefficient
+    return value * s * s
 
 
 def _numbers(values: Numbers) -> tuple[float, ...]:
@@ -321,3 +299,10 @@ def _numbers(values: Numbers) -> tuple[float, ...]:
 def _columns(s: Array, values: Sequence[float] | Array) -> Array:
     """One value a mode, broadcast against s."""
     return np.asarray(values, dtype=float).reshape(-1, *(1,) * s.ndim)
+
+
+def _stacked(first: Array, second: Array, thirds: Array, fourths: Array) -> Array:
+    """The rows of x and x', then two rows for each mode in turn."""
+    out = np.empty((2 + 2 * len(thirds), *first.shape))
+    out[0], out[1], out[2::2], out[3::2] = first, second, thirds, fourths
+    return out

@@ -1,0 +1,235 @@
+"""The guarantees of Burkov (1998) on flights: kept, broken, outside their hypotheses."""
+
+import copy
+import dataclasses
+import math
+import pickle
+from dataclasses import replace
+
+import burkov_cases as cases
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controllers import burkov
+from controllers.burkov_claims import samples
+from spacecraft_sim.controller import Controller
+from spacecraft_sim.guarantee import Guarantee
+from spacecraft_sim.smooth_flight import fly
+from spacecraft_sim.spacecraft import Thruster
+from spacecraft_sim.thrusters import Thrusters
+
+ARM, BODY, FLEXIBLE = cases.ARM, cases.BODY, cases.FLEXIBLE
+
+
+def turned(attitude, vector):
+    return attitude @ Rotation.from_rotvec(vector).as_matrix()
+
+
+def near_the_goal():
+    return BODY.state(
+        rate=np.array([0.2, -0.3, 0.1]), attitude=turned(cases.goal(), [0.5, -0.6, 0.3])
+    )
+
+
+def spinning(p):
+    return BODY.state(rate=np.array([p, 0.1, 0.2]), attitude=turned(np.eye(3), [0.3, -0.4, 0.3]))
+
+
+def spin(**changes):
+    return burkov.permanent_rotation(BODY, **{"spin": 2.0, **cases.SPIN, **changes})
+
+
+def two(**changes):
+    gains = {"spin": 1.0, "beta": 1.0, "gamma": 1.0, "k": 1.6}
+    return burkov.two_torques(BODY, **{**gains, **changes})
+
+
+STRETCHED = np.r_[0.3, -0.4, 0.2, 0.5, -0.6, 0.3, 0.5, -0.5, 0.3, 0.2, 0.1, -0.1]
+
+# Design, plant, start, duration; periods of some ms, so that the flights are short to compute.
+CASES = {
+    "(2.1)": (lambda: cases.position(period=4e-3), ARM, np.array([2.5, -2.0, 1.0, -2.0]), 9.0),
+    "(2.4)": (
+        lambda: cases.position(gravity="at the target", period=4e-3),
+        ARM, np.array([1.2, -0.5, 0.5, 0.5]), 9.0,
+    ),
+    "(3.1)": (lambda: cases.path(period=4e-3), ARM, np.array([0.2, 0.2, 1.2, 1.0]), 9.0),
+    "(3.7)": (
+        lambda: cases.path(feedforward=False, period=4e-3), ARM, np.array([0.2, 0.2, 1.2, 1.0]), 9.0,
+    ),
+    "(4.2)": (lambda: cases.flexible(period=2e-3), FLEXIBLE, STRETCHED, 13.0),
+    "(5.4)": (lambda: cases.vectors(rated=True, period=2e-2), BODY, near_the_goal(), 36.0),
+    "(5.8)": (lambda: cases.vectors(rated=False, period=2e-2), BODY, near_the_goal(), 46.0),
+    "(5.18)": (lambda: spin(period=2e-2), BODY, spinning(1.5), 110.0),
+    "(5.20)": (lambda: two(period=2e-2), BODY, spinning(0.4), 90.0),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=CASES)
+def flown(request):
+    design, plant, start, duration = CASES[request.param]
+    law, claims = design()
+    (run,) = fly(plant, law, starts=start, duration=duration)
+    return law, claims, plant, run
+
+
+def test_every_claim_is_kept_where_its_hypotheses_hold(flown):
+    _, claims, plant, run = flown
+    assert claims
+    assert len({claim.claim for claim in claims}) == len(claims)
+    for claim in claims:
+        assert isinstance(claim, Guarantee)
+        assert set(claim.signals) <= set(plant.units)
+        verdict = claim.check(run)
+        assert verdict.holds, f"{verdict.claim}: {verdict.measured} > {verdict.bound}"
+        assert not verdict.failed
+        assert math.isfinite(verdict.measured)
+        assert "Burkov 1998, Theorem" in verdict.source
+
+
+def test_torques_that_are_not_delivered_void_every_claim(flown):
+    law, claims, _, run = flown
+    name = law.thrusters[0]
+    short = dataclasses.replace(run, signals={**run.signals, name: 0.99 * run[name]})
+    for claim in claims:
+        verdict = claim.check(short)
+        assert not verdict.holds
+        assert any("delivered as commanded" in a.text for a in verdict.failed)
+
+
+def test_a_flight_that_ends_too_soon_promises_nothing_of_its_end(flown):
+    _, claims, _, run = flown
+    cut = len(run.time) // 4
+    short = dataclasses.replace(
+        run, time=run.time[:cut], signals={k: x[:cut] for k, x in run.signals.items()}
+    )
+    ends = [c.check(short) for c in claims if "in the end" in c.claim or "settled" in c.claim]
+    assert ends
+    for verdict in ends:
+        assert not verdict.holds
+        assert any("settled" in a.text for a in verdict.failed)
+
+
+def test_laws_are_frozen_pure_and_picklable(flown):
+    law, _, plant, run = flown
+    assert isinstance(law, Controller)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        law.thrusters = ()
+    before, again = copy.deepcopy(law), pickle.loads(pickle.dumps(law))
+    assert again == law == before
+    memory = law.init()
+    for k in range(4):
+        y = [float(run[name][k]) for name in law.sensors]
+        t = float(run.time[k])
+        u, after = law.step(t, y, memory)
+        assert (u, after) == again.step(t, y, pickle.loads(pickle.dumps(memory)))
+        assert u == pytest.approx([run[f"{n}_command"][k] for n in law.thrusters], abs=1e-9)
+        memory = after
+    assert law == before
+
+
+# -- what is broken shows ----------------------------------------------------------------------
+
+
+def test_an_undamped_flight_breaks_the_claims():
+    law, claims = cases.position(period=4e-3)
+    wrong = replace(law, formula=replace(law.formula, K2=(-60.0, -25.0)))
+    start = np.array([*cases.TARGET, 0.5, -0.5])
+    (run,) = fly(ARM, wrong, starts=start, duration=9.0)
+    falls, ends, stays = (claim.check(run) for claim in claims)
+    assert not falls.holds
+    assert falls.measured > 2 * falls.bound
+    assert not ends.holds
+    assert not stays.holds
+    assert not (falls.failed or ends.failed or stays.failed)
+
+
+def test_the_certified_basin_is_a_hypothesis_of_the_end_alone():
+    law, claims = cases.vectors(rated=False, period=2e-2)
+    attitude = turned(cases.goal(), [0.0, 0.0, 3.0])
+    start = BODY.state(rate=np.array([0.5, 0.5, 0.5]), attitude=attitude)
+    (run,) = fly(BODY, law, starts=start, duration=60.0)
+    falls, ends, stays = (claim.check(run) for claim in claims)
+    (failed,) = ends.failed
+    assert failed.text.startswith("V(0) < 2 min(k2, k3)")
+    assert failed.limit == pytest.approx(2.4)
+    assert failed.value > 2.4
+    assert falls.holds
+    assert stays.holds
+
+
+def test_starts_in_the_certified_basin_never_come_near_another_equilibrium():
+    law, (_, _, stays) = cases.vectors(rated=False, period=2e-2)
+    random = np.random.default_rng(13)
+    attitudes = [turned(cases.goal(), v) for v in random.normal(size=(40, 3)) * 0.6]
+    starts = BODY.state(rate=random.normal(size=(40, 3)) * 0.3, attitude=np.array(attitudes))
+    count = 0
+    for run in fly(BODY, law, starts=starts, duration=12.0):
+        verdict = stays.check(run)
+        assert verdict.holds
+        if verdict.bound < math.sqrt(2 * 2.4 / 1.2):  # V(0) < 2 min(k2, k3)
+            count += 1
+            # |s - (s2, -s3)| at the nearest other equilibrium is 2.
+            assert verdict.measured < 2
+    assert 10 < count < 40
+
+
+@pytest.mark.parametrize("hold", ["first-order hold", "zero-order hold"])
+def test_how_much_v_may_rise_between_samples(hold):
+    """At 1 ms a sampled V rises by 7e-5 V(0) in 10 ms at most: it need not fall at every sample."""
+    law, (falls, *_) = cases.vectors(rated=False, hold=hold)
+    random = np.random.default_rng(14)
+    starts = BODY.state(
+        rate=random.uniform(-1, 1, (6, 3)), attitude=Rotation.random(6, random_state=14).as_matrix()
+    )
+    shares = []
+    for run in fly(BODY, law, starts=starts, duration=5.0):
+        verdict = falls.check(run)
+        assert verdict.holds
+        om, s = (
+            cases.named(run, ("rate_x", "rate_y", "rate_z"))[0],
+            cases.named(run, law.sensors)[0],
+        )
+        V0 = BODY.inertia @ om**2 / 2
+        V0 += np.repeat((1.0, 0.6), 3) @ (s - np.ravel(law.formula.r)) ** 2
+        shares.append(verdict.measured / V0)
+    assert 0 < max(shares) < 7e-5
+
+
+# -- what a flight must have -------------------------------------------------------------------
+
+
+def test_thinned_rows_are_refused():
+    law, claims = cases.position()
+    (run,) = fly(ARM, law, starts=np.zeros(4), duration=0.1, every=7)
+    with pytest.raises(ValueError, match=r"no row at every sample of its law, 0\.001 s apart"):
+        claims[0].check(run)
+
+
+def test_rows_between_samples_do_not_count():
+    law, _ = cases.position(period=0.01)
+    (run,) = fly(ARM, law, starts=np.zeros(4), duration=0.1)
+    doubled = dataclasses.replace(
+        run,
+        time=np.sort(np.r_[run.time, run.time[:-1] + 0.0037]),
+        signals={k: np.repeat(x, 2)[:-1] for k, x in run.signals.items()},
+    )
+    one, two_ = (samples(law, x, ("joint_1_rate",)) for x in (run, doubled))
+    assert all(np.array_equal(a, b) for a, b in zip(one, two_, strict=True))
+    assert one.filtered.shape == (11, 2)
+    assert one.filtered[0] == pytest.approx([0.0, 0.0])
+
+
+def test_a_flight_too_short_to_judge_is_not_a_number():
+    law, (falls, *_) = cases.position()
+    (run,) = fly(ARM, law, starts=np.zeros(4), duration=0.005)
+    verdict = falls.check(run)
+    assert math.isnan(verdict.measured)
+    assert not verdict.holds
+
+
+def test_channels_must_exist():
+    motors = Thrusters([Thruster(name="motor_1", levels=(1.0,), delay=0.1)])  # pyright: ignore
+    with pytest.raises(ValueError, match="thruster 'motor_2' is not in the spacecraft"):
+        burkov.position(ARM, motors, target=cases.TARGET, **cases.GAINS)
