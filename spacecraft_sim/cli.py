@@ -1,4 +1,4 @@
-"""The command `spacecraft-sim`: list, explain, run, export, video, doctor.
+"""The command `spacecraft-sim`: list, explain, run, compare, repair, export, video, doctor.
 
 Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or bad input, 3 the run diverged or crashed.
 Heavy modules are imported by the commands that need them.
@@ -6,6 +6,7 @@ Heavy modules are imported by the commands that need them.
 
 import argparse
 import gc
+import math
 import os
 import sys
 import traceback
@@ -79,6 +80,13 @@ def _parser() -> argparse.ArgumentParser:
     shown = "show the flight in a viewer that is open on this machine; 127.0.0.1:9876 if left out"
     live.add_argument("--connect", nargs="?", const="", metavar="ADDRESS", help=shown)
     live.add_argument("--spawn", action="store_true", help="show the flight in a new viewer")
+    compare = command(_compare, "put two runs in one recording, one figure and one table")
+    compare.add_argument("a", type=Path, metavar="A", help="folder of a run")
+    compare.add_argument("b", type=Path, metavar="B", help="folder of another")
+    compare.add_argument("--out", type=Path, help="folder to write; default runs/A-and-B, numbered")
+    compare.add_argument("--exaggeration", type=float, metavar="FACTOR", help=factor)
+    repair = command(_repair, "make a recording whole whose run was killed")
+    repair.add_argument("file", type=Path, metavar="FILE.rrd", help="recording; it is replaced")
     export = command(_export, "write the complete MJCF of a spacecraft as one file")
     export.add_argument("name", metavar="NAME", help="spacecraft or scenario, or path of its TOML")
     export.add_argument("file", type=Path, metavar="FILE.xml", help="file to write")
@@ -159,6 +167,7 @@ def _run(arguments: argparse.Namespace) -> int:
     mission = _assemble(arguments)
     from spacecraft_sim import run_folder, viewer
 
+    factor = _exaggeration(arguments)
     address = viewer.spawn() if arguments.spawn else viewer.found(arguments.connect)
     folder = run_folder.create(arguments.out, mission.scenario.name)
     try:
@@ -167,7 +176,7 @@ def _run(arguments: argparse.Namespace) -> int:
         subject = run_folder.subject(mission)
         with record.Recording(subject, folder / "recording.rrd", address) as recording:
             predicted = _fly(mission, "reduced")
-            recording.expect(record.reduced(subject, predicted, arguments.exaggeration))
+            recording.expect(record.reduced(subject, predicted, factor))
             measured = _fly(mission, "mujoco", recording.take)
             run_folder.write_flights(folder, mission.scenario, measured, predicted)
             for flight in (measured, predicted):
@@ -252,6 +261,41 @@ def _figure(value: float | None, unit: str) -> str:
     return "" if value is None else f"{value:.6g} {unit}"
 
 
+# -- compare ---------------------------------------------------------------------------------------
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    require_supported_mujoco()
+    from spacecraft_sim import run_folder, run_pair
+
+    factor = _exaggeration(arguments)
+    compared = run_pair.pair(run_pair.read(arguments.a), run_pair.read(arguments.b))
+    name = f"{arguments.a.resolve().name}-and-{arguments.b.resolve().name}"
+    folder = run_folder.create(arguments.out, name)
+    run_folder.write_pair(folder, compared, factor)
+    table = Table("", "A", "B", "B - A", box=None)
+    for heading, rows in run_pair.table(compared):
+        table.add_row(f"[bold]{heading}[/]")
+        for what, *values in rows or [("none",)]:
+            table.add_row(f"  {escape(what)}", *values)
+    console = _console()
+    console.print(table)
+    console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
+    console.print(f"open the recording:  rerun {folder / 'recording.rrd'}", highlight=False)
+    return HOLDS
+
+
+# -- repair ----------------------------------------------------------------------------------------
+
+
+def _repair(arguments: argparse.Namespace) -> int:
+    from spacecraft_sim import repair
+
+    words = "repaired" if repair.repair(arguments.file) else "whole already"
+    print(f"{arguments.file}: {words}; it reads up to t = {repair.end(arguments.file):.6g} s")
+    return HOLDS
+
+
 # -- export ----------------------------------------------------------------------------------------
 
 
@@ -320,6 +364,13 @@ def _assemble(arguments: argparse.Namespace) -> "Mission":
     from spacecraft_sim import mission
 
     return mission.assemble(mission.load_scenario(arguments.name, tuple(arguments.set)))
+
+
+def _exaggeration(arguments: argparse.Namespace) -> float | None:
+    factor = arguments.exaggeration
+    if factor is not None and not 0 < factor < math.inf:
+        raise ValueError(f"--exaggeration {factor:g}: must be a positive number, such as 10")
+    return factor
 
 
 def _console() -> Console:

@@ -58,6 +58,7 @@ class Beneath:
 
     Attributes:
         flight: The flight.
+        known: Flights that are known beforehand: this one, and the other one if it is over.
         key: Its name in paths; in alphabetical order before that of the other.
         name: Its name in keys.
         over_key: Name of the other flight in paths.
@@ -71,6 +72,7 @@ class Beneath:
     """
 
     flight: Trajectory
+    known: Sequence[Trajectory]
     key: str
     name: str
     over_key: str
@@ -100,6 +102,7 @@ def reduced(subject: Subject, flight: Trajectory, factor: float | None = None) -
 
     return Beneath(
         flight=flight,
+        known=(flight,),
         key="reduced",
         name="reduced",
         over_key="simulated",
@@ -209,8 +212,8 @@ class Recording:
         stream, flight, subject = self._stream, beneath.flight, self._subject
         self._beneath = beneath
         self._size = record_scene.extent(self._rest)
-        self._plots = record_signals.plots(flight, list(self._rest.booms))
-        self._planes = record_chart.planes(subject.charts, flight, subject.band)
+        self._plots = record_signals.plots(beneath.known, list(self._rest.booms))
+        self._planes = record_chart.planes(subject.charts, beneath.known, subject.band)
         duration = float(flight.time[-1]) or 1.0
         self._spacing = min(0.05, duration / 1500)
         self._end = flight.time[0]
@@ -231,7 +234,7 @@ class Recording:
         record_chart.maps(stream, subject.charts)
         self._channels: list[Channel] = []
         if beneath.channels:
-            record_signals.lane_styles(stream, beneath.channels, f"{beneath.key} ")
+            record_signals.lane_styles(stream, beneath.channels, beneath.key, True)
         self._document("verdicts", record_text.unjudged_page(subject.title, beneath.notes))
         self._send_layout()
         self._flush()
@@ -245,8 +248,8 @@ class Recording:
         beneath, stream, subject = self._beneath, self._stream, self._subject
         if not self._channels:
             self._channels = channels(part, self._rest, subject.machine)
-            lanes = f"{beneath.over_key} " if beneath.channels else ""
-            record_signals.lane_styles(stream, self._channels, lanes)
+            lanes = beneath.over_key if beneath.channels else ""
+            record_signals.lane_styles(stream, self._channels, lanes, False)
         beside = simulated(subject.model, subject.machine, part, beneath.factor)
         self._beside = beside, part
         root = self._root(beneath.over_key)
@@ -266,7 +269,10 @@ class Recording:
             verdicts: Of the flight on top.
             page: What stands in place of the table of verdicts, as Markdown.
         """
-        self._show_beneath(float("inf"))
+        longest = float(self._beneath.flight.time[-1])
+        if self._subject.band and longest > self._end:
+            record_signals.band(self._stream, self._end, longest, self._subject.band, self._spacing)
+        self._show_beneath(longest)
         record_signals.verdict_events(self._stream, verdicts, self._end)
         title, notes = self._subject.title, self._beneath.notes
         self._document("verdicts", page or record_text.verdict_page(title, verdicts, notes))
@@ -298,7 +304,7 @@ class Recording:
         record_signals.histories(stream, self._plots, part, key)
         record_chart.tracks(stream, self._planes, part, key, before)
         happened = changes(part, found, before)
-        lanes = f"{key} " if self._beneath.channels else ""
+        lanes = key if self._beneath.channels else ""
         record_signals.lanes(stream, happened, lanes)
         record_signals.events(stream, happened, lanes)
         record_scene.plumes(stream, nozzles, happened, PLUME * self._size)
@@ -311,7 +317,13 @@ class Recording:
             extent=self._size,
             factor=beneath.factor,
             ghost=beneath.name,
-            keys=(beneath.key, beneath.over_key),
+            ends={
+                key: float(flight.time[-1])
+                for key, flight in (
+                    (beneath.key, beneath.known[0]),
+                    (beneath.over_key, beneath.known[-1]),
+                )
+            },
             planes=self._planes,
             charts=self._subject.charts,
             band=self._subject.band,

@@ -35,14 +35,14 @@ class Plane:
         word: Name of the view in paths.
         title: What it shows.
         half: Half-widths of its window, in the units of the signals.
-        since: Start of what is shown of the flights, s; None for all.
+        late: Whether only the last `FINAL` seconds of each flight are shown.
     """
 
     portrait: Portrait
     word: str
     title: str
     half: tuple[float, float]
-    since: float | None = None
+    late: bool = False
 
     @property
     def origin(self) -> str:
@@ -50,30 +50,26 @@ class Plane:
         return f"phase/{_slug(self.portrait.name)}/{self.word}"
 
 
-def planes(charts: Charts, flight: Trajectory, band: float | None) -> tuple[Plane, ...]:
+def planes(charts: Charts, known: Sequence[Trajectory], band: float | None) -> tuple[Plane, ...]:
     """Returns the views of each portrait: the whole flight, its end, and what is guaranteed.
 
     Args:
         charts: What the law draws; the axis that moves most gets a portrait of its own if nothing.
-        flight: A flight that is known beforehand, for the windows.
+        known: Flights that are known beforehand, for the windows.
         band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
     """
     drawn, found = portraits(charts), []
     if not drawn:
-        axis = next(iter(moving_axes(flight, "quasi_rigid_angle")), "")
+        axis = next(iter(moving_axes(known[0], "quasi_rigid_angle")), "")
         names = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
-        if all(name in flight.signals for name in names):
-            drawn = [Portrait(name="plane", title="", signals=names, channel="", band=band)]
+        drawn = [Portrait(name="plane", title="", signals=names, channel="", band=band)]
     for portrait in drawn:
-        if not all(name in flight.signals for name in portrait.signals):
+        if not all(name in flight.signals for flight in known for name in portrait.signals):
             continue
-        last = max(float(flight.time[-1]) - FINAL, 0.0)
-        ends = (("whole", "whole flight", None), ("end", "last minute", last))
-        for word, title, since in ends:
-            late = flight.time >= (since or 0.0)
-            half = [1.1 * float(np.abs(flight[s][late]).max()) for s in portrait.signals]
+        for word, title, late in (("whole", "whole flight", False), ("end", "last minute", True)):
+            half = [1.1 * _peak(known, signal, late) for signal in portrait.signals]
             window = half[0] or 1.0, half[1] or 1.0
-            plane = Plane(portrait=portrait, word=word, title=title, half=window, since=since)
+            plane = Plane(portrait=portrait, word=word, title=title, half=window, late=late)
             found.append(plane)
         if bounds := [line.points for line in portrait.lines if line.look == "bound"]:
             half = (1.3 * np.nanmax(np.abs(np.vstack(bounds)), axis=0)).tolist()
@@ -82,6 +78,14 @@ def planes(charts: Charts, flight: Trajectory, band: float | None) -> tuple[Plan
                 Plane(portrait=portrait, word="bound", title="what is guaranteed", half=window)
             )
     return tuple(found)
+
+
+def _peak(known: Sequence[Trajectory], signal: str, late: bool) -> float:
+    shown = [
+        np.abs(flight[signal][flight.time >= (flight.time[-1] - FINAL if late else -np.inf)])
+        for flight in known
+    ]
+    return max(float(value.max()) for value in shown)
 
 
 def plane_frames(stream: Stream, drawn: Sequence[Plane], flight: Trajectory) -> None:
@@ -218,28 +222,36 @@ def maps(stream: Stream, charts: Charts) -> None:
         stream.log(f"{path}/here", here, static=True)
 
 
-def plane_views(drawn: Sequence[Plane], keys: Sequence[str]) -> list[rrb.Spatial2DView]:
+def plane_views(
+    drawn: Sequence[Plane], ends: Mapping[str, float], following: bool
+) -> list[rrb.Spatial2DView]:
     """Returns a view for each plane.
 
     Args:
         drawn: The planes.
-        keys: Names of the flights in paths.
+        ends: End of each flight, s, by its name in paths.
+        following: Whether the end of a flight is taken to be where the cursor is.
     """
     views, boundary = [], rr.TimeRangeBoundary
     for plane in drawn:
-        start = boundary.infinite()
-        if plane.since is not None:
-            start = boundary.absolute(seconds=plane.since)
-        shown = rr.VisibleTimeRange(TIMELINE, start=start, end=boundary.infinite())
-        paths = [_flight(plane.portrait, key) for key in keys]
+        shown = {}
+        for key, end in ends.items():
+            start = boundary.infinite()
+            if plane.late:
+                start = boundary.absolute(seconds=max(end - FINAL, 0.0))
+                if following:
+                    start = boundary.cursor_relative(seconds=-FINAL)
+            shown[_flight(plane.portrait, key)] = rrb.VisibleTimeRanges(
+                rr.VisibleTimeRange(TIMELINE, start=start, end=boundary.infinite())
+            )
         views.append(
             rrb.Spatial2DView(
                 origin=plane.origin,
-                contents=["+ $origin/**", *(f"+ /{path}/**" for path in paths)],
+                contents=["+ $origin/**", *(f"+ /{path}/**" for path in shown)],
                 name=f"Phase plane, {plane.title}",
                 visual_bounds=rrb.VisualBounds2D(x_range=[-1.5, 2.4], y_range=[-1.2, 1.2]),
                 background=NIGHT,
-                overrides={f"{path}/track": [rrb.VisibleTimeRanges(shown)] for path in paths},
+                overrides={f"{path}/track": [times] for path, times in shown.items()},
             )
         )
     return views

@@ -1,6 +1,6 @@
 """The one layout of all recordings: the spacecraft, what was claimed, histories, phase planes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,7 @@ class Layout:
         extent: Size of the spacecraft, m.
         factor: How many times too far the booms are drawn bent.
         ghost: Name of the flight that is drawn translucent.
-        keys: Names of the flights in paths.
+        ends: End of each flight, s, by its name in paths.
         planes: Phase planes.
         charts: What the law draws.
         band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
@@ -33,7 +33,7 @@ class Layout:
     extent: float
     factor: float
     ghost: str
-    keys: Sequence[str]
+    ends: Mapping[str, float]
     planes: Sequence[Plane]
     charts: Charts
     band: float | None
@@ -48,7 +48,7 @@ def blueprint(layout: Layout, *, following: bool) -> rrb.Blueprint:
     """
     left = rrb.Vertical(_space(layout), _words(), row_shares=[3, 2])
     middle = _histories(layout)
-    right = _near_and_planes(layout)
+    right = _near_and_planes(layout, following)
     panel = rrb.TimePanel(
         timeline=TIMELINE,
         state="collapsed",
@@ -119,8 +119,8 @@ def _histories(layout: Layout) -> rrb.Vertical:
     )
 
 
-def _near_and_planes(layout: Layout) -> rrb.Vertical:
-    views = plane_views(layout.planes, layout.keys)
+def _near_and_planes(layout: Layout, following: bool) -> rrb.Vertical:
+    views = plane_views(layout.planes, layout.ends, following)
     firsts = [v for v, plane in zip(views, layout.planes, strict=True) if plane.word == "whole"]
     others = [v for v, plane in zip(views, layout.planes, strict=True) if plane.word != "whole"]
     upper = [rrb.Tabs(*found) for found in ([*firsts, *map_views(layout.charts)], others) if found]

@@ -19,7 +19,8 @@ AXES = {  # colours of the flight on top and of the one beneath
     "x": ((255, 122, 144), (214, 130, 255)),
 }
 PLUS, MINUS, OFF = (240, 98, 74), (74, 144, 240), (44, 47, 56)
-GREY, AMBER, BAND = (120, 126, 140), (255, 200, 87), (22, 62, 40)
+GREY, BAND = (120, 126, 140), (22, 62, 40)
+AMBER = ((255, 200, 87), (150, 104, 24))  # thrust of the flight on top and of the one beneath
 KINDS = ("attitude", "quasi_rigid_angle", "rate", "quasi_rigid_rate")
 WIDTHS = (2.0, 4.2)  # of the line on top and of the one beneath
 
@@ -41,24 +42,24 @@ class Plot:
     colors: tuple[tuple[Color, Color], ...]
 
 
-def plots(flight: Trajectory, booms: Sequence[str]) -> tuple[Plot, ...]:
+def plots(known: Sequence[Trajectory], booms: Sequence[str]) -> tuple[Plot, ...]:
     """Returns what is plotted: whatever moves.
 
     Args:
-        flight: A flight that is known beforehand.
+        known: Flights that are known beforehand.
         booms: Names of the booms.
     """
     found = []
     for kind in KINDS:
-        if axes := sorted(moving_axes(flight, kind)):
+        if axes := sorted({axis for flight in known for axis in moving_axes(flight, kind)}):
             signals = tuple(f"{kind}_{axis}" for axis in axes)
             colors = tuple(AXES[axis] for axis in axes)
             found.append(Plot(view=kind, signals=signals, labels=tuple(axes), colors=colors))
     tips = [
-        (boom, axis, k, float(np.ptp(flight[f"{boom}_tip_{axis}"])))
+        (boom, axis, k, max(float(np.ptp(flight[f"{boom}_tip_{axis}"])) for flight in known))
         for k, boom in enumerate(booms)
         for axis in "yz"
-        if f"{boom}_tip_{axis}" in flight.signals
+        if all(f"{boom}_tip_{axis}" in flight.signals for flight in known)
     ]
     least = 1e-3 * max((swing for *_, swing in tips), default=0.0)
     if moving := [(boom, axis, k) for boom, axis, k, swing in tips if swing >= least]:
@@ -149,13 +150,14 @@ def band(stream: Stream, start: float, stop: float, band: float, spacing: float)
         stream.send_columns("bound/angle", times, edges)
 
 
-def lane_styles(stream: Stream, channels: Sequence[Channel], name: str) -> None:
+def lane_styles(stream: Stream, channels: Sequence[Channel], name: str, beneath: bool) -> None:
     """Logs how commands and delivered thrusts look, as lanes of states and as plots.
 
     Args:
         stream: The recording.
         channels: The channels.
         name: Name of the flight, put before the lanes' names; empty for none.
+        beneath: Whether the flight is drawn beneath the other.
     """
     for channel in channels:
         values = np.array(list(channel.states.values()))
@@ -171,7 +173,7 @@ def lane_styles(stream: Stream, channels: Sequence[Channel], name: str) -> None:
             stream.log(f"relay/{path}", lane, static=True)
             plot = rr.SeriesLines(
                 names=f"{path} [{channel.unit}]",
-                colors=GREY if what == "command" else AMBER,
+                colors=GREY if what == "command" else AMBER[beneath],
                 widths=1.2 if what == "command" else 2.0,
                 interpolation_mode="StepAfter",
                 aggregation_policy="MinMax",
@@ -204,7 +206,7 @@ def lanes(stream: Stream, found: Sequence[Changes], name: str) -> None:
 def _lane(channel: Channel, what: What, name: str) -> str:
     """In the viewer the path is the name of the lane."""
     word = "command" if what == "command" else "delivered"
-    return f"{channel.name}/{name}{word}"
+    return f"{channel.name}/{name}_{word}" if name else f"{channel.name}/{word}"
 
 
 def events(stream: Stream, found: Sequence[Changes], name: str) -> None:
@@ -216,25 +218,31 @@ def events(stream: Stream, found: Sequence[Changes], name: str) -> None:
         name: As for `lane_styles`.
     """
     rows = [
-        (time, "INFO" if change.what == "command" else "TRACE", f"{name}{words}")
+        (
+            time,
+            "INFO" if change.what == "command" else "TRACE",
+            f"{name}: {words}" if name else words,
+        )
         for change in found
         for time, words in zip(change.time.tolist(), change.words(), strict=True)
     ]
     _log_events(stream, sorted(rows))
 
 
-def verdict_events(stream: Stream, verdicts: Sequence[Verdict], end: float) -> None:
+def verdict_events(stream: Stream, verdicts: Sequence[Verdict], end: float, name: str = "") -> None:
     """Logs the instants that decided the verdicts.
 
     Args:
         stream: The recording.
         verdicts: The verdicts.
         end: End of the flight, s.
+        name: Name of the flight, put before the claims; empty for none.
     """
     rows = []
     for v in verdicts:
         word = "closest to its bound" if v.holds else "BROKEN" if v.margin < 0 else "not guaranteed"
-        text = f"claim {word}: {v.claim}: {v.measured:.4g} {v.unit}, bound {v.bound:.4g}"
+        about = f"{name}: claim {word}" if name else f"claim {word}"
+        text = f"{about}: {v.claim}: {v.measured:.4g} {v.unit}, bound {v.bound:.4g}"
         level = "DEBUG" if v.holds else "ERROR"
         rows.append((end if v.t_worst is None else v.t_worst, level, text))
     _log_events(stream, sorted(rows))

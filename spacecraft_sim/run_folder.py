@@ -17,6 +17,7 @@ from spacecraft_sim.versions import versions
 
 if TYPE_CHECKING:
     from spacecraft_sim.record import Subject
+    from spacecraft_sim.run_pair import Pair
 
 
 def create(path: Path | None, name: str) -> Path:
@@ -145,6 +146,30 @@ def write_pictures(
         comparison=comparison,
         scenario_toml=resolved(mission.scenario),
     )
+
+
+def write_pair(folder: Path, compared: "Pair", factor: float | None) -> None:
+    """Writes `comparison.json`, `comparison.png` and `recording.rrd` of two runs.
+
+    Args:
+        folder: The folder.
+        compared: The runs.
+        factor: How many times too far booms are bent; a round factor if left out.
+    """
+    from spacecraft_sim import plots_pair, record_pair, run_pair
+
+    run_pair.write_json(folder / "comparison.json", compared)
+    a, b = compared.a, compared.b
+    names = [f"{run.mission.scenario.name} ({run.folder.resolve().name})" for run in (a, b)]
+    plots_pair.page(
+        folder / "comparison.png",
+        a=a.flight,
+        b=b.flight,
+        title=f"A: {names[0]},  B: {names[1]}",
+        bands=(a.mission.accuracy, b.mission.accuracy),
+        table=run_pair.table(compared),
+    )
+    record_pair.write(folder / "recording.rrd", compared, factor)
 
 
 def _plain(verdict: Verdict) -> dict[str, Any]:

@@ -1,12 +1,16 @@
 """A viewer on this machine to which a recording is sent while it is made; loopback only."""
 
 import ipaddress
+import os
+import signal
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
 
+# The viewer's program with its exit code, which `python -m rerun_cli` drops.
+RERUN = (sys.executable, "-c", "import sys, rerun_cli.__main__ as m; sys.exit(m.main())")
 PORT = 9876  # where a viewer listens unless told otherwise
 _SCHEME, _PATH = "rerun+http://", "/proxy"
 
@@ -51,7 +55,7 @@ def spawn(options: Sequence[str] = (), patience: float = 30.0) -> str:
     # Left to itself the viewer listens on all addresses.
     words = ["--bind", host, "--port", str(port), "--expect-data-soon", *options]
     started = subprocess.Popen(
-        [sys.executable, "-m", "rerun_cli", *words],
+        [*RERUN, *words],
         start_new_session=True,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -61,7 +65,7 @@ def spawn(options: Sequence[str] = (), patience: float = 30.0) -> str:
         if (code := started.poll()) is not None:
             raise ValueError(f"--spawn: the viewer ended with code {code}; is there a display?")
         if time.monotonic() > end:
-            started.terminate()
+            os.killpg(started.pid, signal.SIGTERM)
             raise ValueError(f"--spawn: the viewer does not listen after {patience:g} s")
         time.sleep(0.05)
     return _address(host, port)

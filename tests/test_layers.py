@@ -50,6 +50,7 @@ ONLY_IN = {
         "record_layout",
         "record_scene",
         "record_signals",
+        "repair",
     },
     "matplotlib": {"plots", "plots_chart", "plots_film"},
     "controllers": {"mission", "cli"},

@@ -1,0 +1,79 @@
+"""Two runs in one recording: B over A, whose spacecraft is the ghost."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from spacecraft_sim import record, run_folder
+from spacecraft_sim.frames import Frames, at_rest, simulated, suited_factor
+from spacecraft_sim.record_scene import drawn_bodies
+from spacecraft_sim.record_text import cell, verdict_table
+from spacecraft_sim.run_pair import Pair, Run, table
+from spacecraft_sim.trajectory import Trajectory
+
+
+def write(path: Path, compared: Pair, factor: float | None = None) -> None:
+    """Writes the recording of two runs.
+
+    Args:
+        path: The .rrd file.
+        compared: The runs.
+        factor: How many times too far booms are bent; a round factor that shows it if left out.
+    """
+    a, b = compared.a, compared.b
+    below, above = run_folder.subject(a.mission), run_folder.subject(b.mission)
+    names = {chart.name for chart in above.charts}
+    subject = record.Subject(
+        title=f"A: {_name(a)}, B: {_name(b)}",
+        scenario=f"# A: {a.folder}\n{below.scenario}\n\n# B: {b.folder}\n{above.scenario}",
+        model=above.model,
+        machine=above.machine,
+        band=above.band if above.band == below.band else None,
+        charts=(*above.charts, *(x for x in below.charts if x.name not in names)),
+    )
+    if factor is None:
+        factor = min(_factor(run) for run in (a, b))
+    rest = at_rest(below.model, below.machine)
+
+    def frames(part: Trajectory, beside: Frames, over: Trajectory) -> Frames:
+        return simulated(below.model, below.machine, part, factor)
+
+    beneath = record.Beneath(
+        flight=a.flight,
+        known=(a.flight, b.flight),
+        key="A",
+        name="A",
+        over_key="B",
+        over_name="B",
+        rest=rest,
+        bodies=drawn_bodies(rest),
+        frames=frames,
+        factor=factor,
+        channels=record.channels(a.flight, rest, below.machine),
+        notes=(f"Booms are drawn bent {factor:g} times as far as they are. Translucent: run A.",),
+    )
+    record.write(path, subject, b.flight, beneath, b.verdicts, page(compared, beneath.notes))
+
+
+def page(compared: Pair, notes: Sequence[str]) -> str:
+    """Returns the table of differences as Markdown.
+
+    Args:
+        compared: The runs.
+        notes: What is to be said of the recording.
+    """
+    lines = [f"# A: {_name(compared.a)}, B: {_name(compared.b)}", *notes]
+    for heading, rows in table(compared):
+        lines += ["", f"**{heading}**", "", "|  | A | B | B - A |", "|:--|--:|--:|--:|"]
+        lines += [f"| {' | '.join(cell(text) for text in row)} |" for row in rows]
+    for word, run in (("A", compared.a), ("B", compared.b)):
+        lines += ["", f"**claims of {word}**", "", *verdict_table(run.verdicts)]
+    return "\n".join(lines)
+
+
+def _name(run: Run) -> str:
+    return f"{run.mission.scenario.name} ({run.folder.name})"
+
+
+def _factor(run: Run) -> float:
+    lengths = {boom.name: boom.length for boom in run.mission.machine.booms}
+    return suited_factor(run.flight, lengths)
