@@ -228,9 +228,10 @@ def test_thrust_is_drawn_as_an_arrow_that_turns_the_right_way(page):
     ]
     assert arrows
     for thrust, arrow in arrows:
-        # As seen from +z a positive torque goes round anticlockwise: over the top to the left.
-        (start, *_, end) = arrow._path_original.vertices
-        assert np.sign(start[0] - end[0]) == np.sign(float(thrust.split()[0]))
+        # As seen from +z a positive torque goes round anticlockwise.
+        x, y = arrow._path_original.vertices.T
+        turned_by = x[:-1] * y[1:] - x[1:] * y[:-1]
+        assert np.all(np.sign(turned_by) == np.sign(float(thrust.split()[0])))
 
 
 def test_commands_too_dense_to_draw_are_said_to_be(page):

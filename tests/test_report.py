@@ -245,6 +245,7 @@ def test_the_page_says_what_the_verdicts_say(tmp_path):
         "holds" if v.holds else "fails" for v in verdicts
     ]
     assert flight.mission.scenario.title in text
+    assert "|beta/J| &lt; eps from" in table
     for heading in ("Assumptions", "Scenario", "Replay", "Errata of the sources"):
         assert f"<h2>{heading}</h2>" in text
     for command, _ in report.COMMANDS:
