@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from controllers import (
+    burkov,
     efremov,
     efremov_observer,
     ivanova_sokolov,
@@ -18,6 +19,12 @@ from spacecraft_sim.guarantee import Guarantee
 Design = Callable[..., tuple[Controller, tuple[Guarantee, ...]]]  # (model, thrusters, **parameters)
 
 REGISTRY: dict[str, Design] = {
+    "burkov_position": burkov.position,
+    "burkov_path": burkov.path,
+    "burkov_flexible_joint": burkov.flexible_joint,
+    "burkov_body_vectors": burkov.body_vectors,
+    "burkov_permanent_rotation": burkov.permanent_rotation,
+    "burkov_two_torques": burkov.two_torques,
     "efremov_local": efremov.design_local,
     "efremov_nonlocal": efremov.design_nonlocal,
     "efremov_observed": efremov_observer.design_observed,

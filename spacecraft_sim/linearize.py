@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from spacecraft_sim import beam, mjcf
+from spacecraft_sim.checks import choices
 from spacecraft_sim.readings import Readings, undeformed_mass_matrix
 from spacecraft_sim.scenario import Initial
 from spacecraft_sim.spacecraft import Boom, Spacecraft
@@ -79,6 +80,30 @@ def linearize(model: mujoco.MjModel) -> Linearization:
     )
 
 
+def eigenvalues(model: mujoco.MjModel) -> Array:
+    """Returns the eigenvalues of the free motion at the reference configuration, shape (2 nv,).
+
+    Gravity, tendons and whatever else `linearize` refuses are differenced.
+
+    Args:
+        model: The compiled model.
+    """
+    data, n = mujoco.MjData(model), model.nv
+
+    def accelerations(dq: Array, dv: Array) -> Array:
+        data.qpos[:] = model.qpos0
+        mujoco.mj_integratePos(model, data.qpos, dq, 1.0)
+        data.qvel[:] = dv
+        mujoco.mj_forward(model, data)
+        return data.qacc.copy()
+
+    none, unit = np.zeros(n), np.eye(n) * _STEP
+    columns = [(accelerations(e, none) - accelerations(-e, none)) / (2 * _STEP) for e in unit]
+    columns += [(accelerations(none, e) - accelerations(none, -e)) / (2 * _STEP) for e in unit]
+    lower = np.array(columns).T.reshape(n, 2 * n)
+    return np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), lower]))
+
+
 def initial_state(
     model: mujoco.MjModel, spacecraft: Spacecraft, initial: Initial
 ) -> tuple[Array, Array]:
@@ -90,14 +115,39 @@ def initial_state(
         initial: Attitude, rate and boom deflection.
 
     Raises:
-        ValueError: If the bus cannot turn the way that is asked for.
+        ValueError: If the bus cannot turn the way that is asked for, or there is no such joint.
     """
     tangent, rate = np.zeros(model.nv), np.zeros(model.nv)
-    bus = model.body(mjcf.BUS)
-    joint = model.joint(int(bus.jntadr[0]))
-    dof = int(joint.dofadr[0])
-    if joint.type[0] == mujoco.mjtJoint.mjJNT_FREE:
-        tangent[dof + 3 : dof + 6], rate[dof + 3 : dof + 6] = initial.attitude, initial.rate
+    _turn_bus(model, spacecraft, initial, tangent, rate)
+    for boom in spacecraft.booms:
+        for name, angle in mjcf.bent(boom, initial.boom_mode, initial.boom_amplitude).items():
+            tangent[model.joint(name).dofadr[0]] = angle
+    for name, start, values in (
+        ("joints", tangent, initial.joints),
+        ("joint_rates", rate, initial.joint_rates),
+    ):
+        for joint, value in values.items():
+            start[_scalar_dof(model, joint, f"initial.{name}")] = value
+    return tangent, rate
+
+
+def _turn_bus(
+    model: mujoco.MjModel, spacecraft: Spacecraft, initial: Initial, tangent: Array, rate: Array
+) -> None:
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, mjcf.BUS)
+    if number < 0:
+        for name, vector in (("attitude", initial.attitude), ("rate", initial.rate)):
+            if any(vector):
+                raise ValueError(
+                    f"initial.{name} = {vector}: {spacecraft.name} has no {mjcf.BUS!r}; set "
+                    "initial.joints and initial.joint_rates"
+                )
+        return
+    joint = model.joint(int(model.body_jntadr[number]))
+    kind, dof = mujoco.mjtJoint(joint.type[0]), int(joint.dofadr[0])
+    if kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
+        turn = dof + (3 if kind == mujoco.mjtJoint.mjJNT_FREE else 0)
+        tangent[turn : turn + 3], rate[turn : turn + 3] = initial.attitude, initial.rate
     else:
         axis = joint.axis
         for name, vector in (("attitude", initial.attitude), ("rate", initial.rate)):
@@ -105,10 +155,15 @@ def initial_state(
             if np.any(across != 0):
                 raise ValueError(f"initial.{name} = {vector}: the bus turns about {axis} alone")
         tangent[dof], rate[dof] = np.dot(initial.attitude, axis), np.dot(initial.rate, axis)
-    for boom in spacecraft.booms:
-        for name, angle in mjcf.bent(boom, initial.boom_mode, initial.boom_amplitude).items():
-            tangent[model.joint(name).dofadr[0]] = angle
-    return tangent, rate
+
+
+def _scalar_dof(model: mujoco.MjModel, name: str, key: str) -> int:
+    joints = [model.joint(j) for j in range(model.njnt)]
+    scalar = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    known = {j.name: int(j.dofadr[0]) for j in joints if mujoco.mjtJoint(j.type[0]) in scalar}
+    if name not in known:
+        raise ValueError(choices("joint", name, known, where=key))
+    return known[name]
 
 
 def planar_bus(model: mujoco.MjModel, spacecraft: Spacecraft) -> tuple[float, float, Boom]:

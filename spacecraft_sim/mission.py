@@ -6,17 +6,19 @@ Beside the command line this is the only module that knows the controllers.
 import inspect
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from pydantic import create_model
+from pydantic import TypeAdapter, create_model
 
 import controllers
 from controllers import REGISTRY, Design
+from controllers.burkov_lyapunov import Body
 from spacecraft_sim import (
     beam,
+    compiled_mechanism,
     config,
     conservation,
     errata,
@@ -31,7 +33,9 @@ from spacecraft_sim.checks import choices
 from spacecraft_sim.compare import Comparison, compare
 from spacecraft_sim.controller import Controller
 from spacecraft_sim.disturbance import Disturbance
+from spacecraft_sim.equations import EquationsPhysics
 from spacecraft_sim.guarantee import Guarantee
+from spacecraft_sim.mechanisms import FlexibleMechanism, Mechanism
 from spacecraft_sim.physics import MujocoPhysics
 from spacecraft_sim.plant import PlantName
 from spacecraft_sim.scenario import Scenario
@@ -62,7 +66,7 @@ class Mission:
     scenario: Scenario
     machine: Spacecraft
     mujoco: MujocoPhysics
-    reduced: reduced.ReducedPhysics
+    reduced: reduced.ReducedPhysics | EquationsPhysics
     design: Design
     controller: Controller
     guarantees: tuple[Guarantee, ...]
@@ -78,13 +82,24 @@ class Mission:
     @property
     def errata(self) -> tuple[errata.Section, ...]:
         """Known misprints of the papers that the law, its module or its claims cite."""
-        balances = len(conservation.momentum_balances(self.reduced.model))  # true of any law
-        own = self.guarantees[: len(self.guarantees) - balances]
+        own = self.guarantees
+        if isinstance(self.reduced, reduced.ReducedPhysics):  # balances are true of any law
+            balances = conservation.momentum_balances(self.reduced.model)
+            own = own[: len(own) - len(balances)]
         about = (self.design, sys.modules[self.design.__module__])
         cited = "\n".join([*(part.__doc__ or "" for part in about), *(g.source for g in own)])
         listed = Path(controllers.__file__ or "").with_name("ERRATA.md")
         found = errata.sections(listed.read_text(encoding="utf-8"))
         return tuple(section for section in found if section.concerns(cited))
+
+    @property
+    def linear_model(self) -> reduced.ReducedModel:
+        """The linear model that flies as the reduced plant.
+
+        Raises:
+            ValueError: If the reduced plant is the machine's own equations of motion.
+        """
+        return _linear(self.reduced)
 
     def environment(self, plant: PlantName = "mujoco") -> Environment:
         """Returns a dm_control environment with the law closed inside its task.
@@ -196,9 +211,17 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
     full = build(machine)
     plant = reduced_plant(scenario, nominal, full if machine == nominal else build(nominal))
     thrusters = Thrusters(nominal.thrusters)
-    parameters = {key: value for key, value in scenario.controller.items() if key != "law"}
-    design = laws[scenario.controller["law"]]
-    law, guarantees = design(plant.model, thrusters, **parameters)
+    name = scenario.controller["law"]
+    parameters = _parameters(laws[name], scenario.controller)
+    nominal_model = full.model.ptr if machine == nominal else build(nominal).model.ptr
+    try:
+        law, guarantees = laws[name](
+            _known_model(laws[name], plant, nominal_model), thrusters, **parameters
+        )
+    except ValueError as error:
+        raise ValueError(f"{scenario.name}, law {name}: {error}") from error
+    if isinstance(plant, reduced.ReducedPhysics):
+        guarantees += conservation.momentum_balances(plant.model)
     mission = Mission(
         scenario=scenario,
         machine=machine,
@@ -206,7 +229,7 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
         reduced=plant,
         design=design,
         controller=law,
-        guarantees=guarantees + conservation.momentum_balances(plant.model),
+        guarantees=guarantees,
         thrusters={"mujoco": Thrusters(machine.thrusters), "reduced": thrusters},
         disturbance=disturbance,
     )
@@ -218,9 +241,44 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
     return mission
 
 
-def reduced_plant(
-    scenario: Scenario, machine: Spacecraft, full: MujocoPhysics
-) -> reduced.ReducedPhysics:
+ReducedPlant = reduced.ReducedPhysics | EquationsPhysics
+
+# What a design asks for by the type of its first argument, read off the compiled machine.
+_MODELS: dict[Any, Callable[[Any], Any]] = {
+    Mechanism: compiled_mechanism.mechanism,
+    FlexibleMechanism: compiled_mechanism.flexible_mechanism,
+    Body: compiled_mechanism.body,
+}
+
+
+def _known_model(design: Design, plant: ReducedPlant, model: Any) -> Any:
+    """What a law may know of its machine: the linear model, unless its design asks for another."""
+    first = next(iter(inspect.signature(design, eval_str=True).parameters.values())).annotation
+    for kind in get_args(first) or (first,):
+        if kind in _MODELS:
+            return _MODELS[kind](model)
+    return _linear(plant)
+
+
+def _linear(plant: ReducedPlant) -> reduced.ReducedModel:
+    if isinstance(plant, EquationsPhysics):
+        raise ValueError('a linear model is needed: set reduced.source = "mjcf"')
+    return plant.model
+
+
+def _parameters(design: Design, table: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters of a law; a table becomes the dataclass that the design takes."""
+    known = parameters_of(design)
+    return {
+        key: TypeAdapter(known[key].annotation).validate_python(value)
+        if is_dataclass(known[key].annotation)
+        else value
+        for key, value in table.items()
+        if key != "law"
+    }
+
+
+def reduced_plant(scenario: Scenario, machine: Spacecraft, full: MujocoPhysics) -> ReducedPlant:
     """Builds the reduced plant with the inputs of the full one.
 
     Args:
@@ -231,6 +289,12 @@ def reduced_plant(
     Raises:
         ValueError: If the machine has no such reduced model.
     """
+    if scenario.reduced.source == "equations":
+        return EquationsPhysics(
+            machine,
+            disturbances=[n for n in full.inputs if n.startswith("disturbance_")],
+            timestep=scenario.simulation.timestep,
+        )
     model, modes = full.model.ptr, scenario.reduced.modes
     linear = linearize.linearize(model)
     wiring = mjcf.channels(machine, [n for n in full.inputs if n.startswith("disturbance_")])

@@ -42,9 +42,8 @@ def assemble(spacecraft: Spacecraft) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_file(str(spacecraft.xml))
     except (ValueError, OSError) as error:
         raise ValueError(f"{spacecraft.xml}: {error}") from error
-    if spec.body(BUS) is None:
-        names = [body.name for body in spec.bodies if body.name != "world"]
-        raise ValueError(choices("body", BUS, names, where=spacecraft.xml.name))
+    if spacecraft.booms:
+        _bus(spec, spacecraft)
     for boom in spacecraft.booms:
         _grow(spec, boom, spacecraft)
     actuators = [actuator.name for actuator in spec.actuators]
@@ -53,6 +52,14 @@ def assemble(spacecraft: Spacecraft) -> mujoco.MjSpec:
             raise ValueError(choices("actuator", name, actuators, where=spacecraft.xml.name))
     spec.modelname = spacecraft.name
     return spec
+
+
+def _bus(spec: mujoco.MjSpec, spacecraft: Spacecraft):
+    """The body that carries booms and disturbances; machines without either need none."""
+    if (bus := spec.body(BUS)) is None:
+        names = [body.name for body in spec.bodies if body.name != "world"]
+        raise ValueError(choices("body", BUS, names, where=spacecraft.xml.name))
+    return bus
 
 
 def motors(thruster: Thruster) -> tuple[str, ...]:
@@ -97,7 +104,7 @@ def compile(
     spec, disturbances = assemble(spacecraft), tuple(disturbances)
     for name in disturbances:
         axis = _axis_of(name)
-        site = spec.body(BUS).add_site(name=name)
+        site = _bus(spec, spacecraft).add_site(name=name)
         spec.add_actuator(
             name=name,
             target=site.name,
@@ -115,7 +122,7 @@ def compile(
         model = spec.compile()
     except ValueError as error:
         raise ValueError(f"{spacecraft.xml}: {error}") from error
-    _refuse_what_does_not_float(model, spacecraft.xml)
+    _refuse_what_does_not_float(model, spacecraft)
     _refuse_other_masses(model, spacecraft)
     return model
 
@@ -318,18 +325,21 @@ def _refuse_other_masses(model: mujoco.MjModel, spacecraft: Spacecraft) -> None:
             )
 
 
-def _refuse_what_does_not_float(model: mujoco.MjModel, where: Path) -> None:
-    """A spacecraft floats: no gravity, no contacts, no medium."""
+def _refuse_what_does_not_float(model: mujoco.MjModel, spacecraft: Spacecraft) -> None:
+    """A spacecraft floats: no gravity, unless its file says so, no contacts, no medium."""
     faults = []
-    if np.any(model.opt.gravity):
-        faults.append(f'gravity is on: {model.opt.gravity}; set <option gravity="0 0 0"/>')
+    if np.any(model.opt.gravity) and not spacecraft.gravity:
+        faults.append(
+            f'gravity is on: {model.opt.gravity}; set <option gravity="0 0 0"/>, or, for a machine '
+            "on the ground, gravity = true in its TOML file"
+        )
     contacts_off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
     if not contacts_off and _can_touch(model):
         faults.append('contacts are on; set <flag contact="disable"/> or contype = conaffinity = 0')
     if model.opt.density or model.opt.viscosity:
         faults.append("the medium has density or viscosity; a spacecraft flies in vacuum")
     if faults:
-        raise ValueError(f"{where}: {'; '.join(faults)}")
+        raise ValueError(f"{spacecraft.xml}: {'; '.join(faults)}")
 
 
 def _can_touch(model: mujoco.MjModel) -> bool:

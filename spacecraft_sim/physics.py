@@ -241,7 +241,9 @@ def require_stable_step(model: mujoco.MjModel, timestep: float) -> None:
     Raises:
         ValueError: Giving the largest stable step, if |lambda|_max timestep >= 2.5.
     """
-    fastest = float(np.max(np.abs(linearize.linearize(model).eigenvalues()), initial=0.0))
+    grounded = np.any(model.opt.gravity) or model.ntendon
+    values = linearize.eigenvalues(model) if grounded else linearize.linearize(model).eigenvalues()
+    fastest = float(np.max(np.abs(values), initial=0.0))
     if fastest * timestep >= RK4_LIMIT:
         raise ValueError(
             f"timestep {timestep} s is over the stability limit {RK4_LIMIT / fastest:.4g} s of "

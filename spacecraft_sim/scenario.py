@@ -10,12 +10,17 @@ from spacecraft_sim.spacecraft import Boom, Thruster
 
 
 class Initial(Model):
-    """State at t = 0: the bus turned and turning, the booms bent and at rest in its frame."""
+    """State at t = 0: the bus turned and turning, the booms bent and at rest in its frame.
+
+    Machines without a bus start from their joints.
+    """
 
     attitude: tuple[float, float, float] = quantity("rotation vector", "rad", (0.0, 0.0, 0.0))
     rate: tuple[float, float, float] = quantity("body rate", "rad/s", (0.0, 0.0, 0.0))
     boom_mode: int = quantity("cantilever mode into which every boom is bent", "", 1, ge=1)
     boom_amplitude: float = quantity("modal coordinate q, kappa = length: tip at 2 q", "m", 0.0)
+    joints: dict[str, float] = quantity("joint angles by joint name", "rad", {})
+    joint_rates: dict[str, float] = quantity("joint rates by joint name", "rad/s", {})
     attitude_scatter: float = quantity(
         "half-width of a uniform scatter of each attitude component that is not 0", "rad", 0.0, ge=0
     )
@@ -53,8 +58,11 @@ class Actual(Model):
 class Reduced(Model):
     """The reduced model that flies beside MuJoCo."""
 
-    source: Literal["galerkin", "mjcf"] = quantity(
-        "Bubnov-Galerkin with cantilever shapes, or modes of the compiled MJCF", "", "mjcf"
+    source: Literal["galerkin", "mjcf", "equations"] = quantity(
+        "Bubnov-Galerkin with cantilever shapes, modes of the compiled MJCF, or the machine's own "
+        "equations of motion",
+        "",
+        "mjcf",
     )
     modes: int = quantity("elastic modes kept", "", 1, ge=0)
 

@@ -20,10 +20,9 @@ class Environment(control.Environment):
     _task: ControlTask
 
     def __init__(self, physics: Any, task: ControlTask, *, duration: float, substeps: int):
-        interval = substeps * physics.timestep()
         super().__init__(physics, task, time_limit=duration, n_sub_steps=substeps)
         # A control step may be shortened by the end of the flight, never lengthened.
-        self._interval, self._duration = interval, duration
+        self._substeps, self._timestep, self._duration = substeps, physics.timestep(), duration
 
     def step(self, action: Any) -> dm_env.TimeStep:
         """Flies one control step.
@@ -41,7 +40,9 @@ class Environment(control.Environment):
             return self.reset()
         physics, task = self._physics, self._task
         self._step_count += 1
-        end = min(self._step_count * self._interval, self._duration)
+        # A product of a whole number and the timestep, as the samples of a law are of its period:
+        # where both are alike they fall on the same instant to the last bit.
+        end = min(self._step_count * self._substeps * self._timestep, self._duration)
         task.before_step(action, physics)
         task.fly(physics, end)
         physics.check_divergence()

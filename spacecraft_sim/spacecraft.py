@@ -1,9 +1,9 @@
-"""A spacecraft as plain validated data: its MJCF bus, its booms, its thrusters."""
+"""A machine as plain validated data: its MJCF, its booms, its thrusters, its equations of motion."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from spacecraft_sim import config, library
 from spacecraft_sim.beam import Rule
@@ -38,7 +38,7 @@ def _as_delay(value: Any) -> Any:
 
 
 class Thruster(Model):
-    """A relay thruster channel: levels, delay, minimum on-time, linear rise and fall."""
+    """A thruster channel: levels, delay, minimum on-time, linear rise and fall."""
 
     name: str = quantity("channel name, the input that controllers command")
     actuators: tuple[str, ...] = quantity(
@@ -47,6 +47,9 @@ class Thruster(Model):
     levels: tuple[float, ...] = quantity("amplitudes of either sign", "N or N m", min_length=1)
     delay: Annotated[Delay, BeforeValidator(_as_delay)] = quantity(
         "delay from command to valve", "s", Delay(mean=0.0)
+    )
+    proportional: bool = quantity(
+        "whether it delivers any thrust up to its highest level, not its levels alone", "", False
     )
     min_on_time: float = quantity("shortest time at a level other than zero", "s", 0.0, ge=0)
     rise_time: float = quantity("time to build up a level, linear", "s", 0.0, ge=0)
@@ -60,13 +63,63 @@ class Thruster(Model):
             raise ValueError("levels are amplitudes, all > 0")
         return tuple(sorted(levels))
 
+    @model_validator(mode="after")
+    def _valve_follows(self) -> "Thruster":
+        if self.proportional and self.min_on_time:
+            raise ValueError(
+                f"min_on_time = {self.min_on_time} s is of a relay; a proportional thruster has "
+                "none: leave it out or set proportional = false"
+            )
+        return self
+
+
+class _Links(Model):
+    lengths: tuple[float, ...] = quantity("from each joint to the next", "m", min_length=1)
+    centres: tuple[float, ...] = quantity("from each joint to its link's centre of mass", "m")
+    masses: tuple[float, ...] = quantity("masses of the links", "kg")
+    inertias: tuple[float, ...] = quantity("inertias about the centres of mass", "kg m^2")
+    g: float = quantity("acceleration of gravity", "m/s^2", 9.81, ge=0)
+
+
+class PlanarArmEquations(_Links):
+    """Numbers of Lagrange's equations of an arm in a vertical plane, link by link."""
+
+    kind: Literal["planar_arm"] = quantity("which equations")
+
+
+class FlexibleJointEquations(_Links):
+    """The same for an arm whose rotors drive its links through springs."""
+
+    kind: Literal["flexible_joint_arm"] = quantity("which equations")
+    rotors: tuple[float, ...] = quantity("inertias of the rotors", "kg m^2")
+    stiffnesses: tuple[float, ...] = quantity("stiffnesses of the springs", "N m/rad")
+
+
+class RigidBodyEquations(Model):
+    """Numbers of the equations of Euler and Poisson of a rigid body."""
+
+    kind: Literal["rigid_body"] = quantity("which equations")
+    inertia: tuple[float, float, float] = quantity("principal moments A, B, C", "kg m^2")
+    axes: tuple[float, float, float, float] = quantity(
+        "quaternion (w, x, y, z) from principal to body axes", "", (1.0, 0.0, 0.0, 0.0)
+    )
+
+
+Equations = Annotated[
+    PlanarArmEquations | FlexibleJointEquations | RigidBodyEquations, Field(discriminator="kind")
+]
+
 
 class Spacecraft(Model):
-    """A machine: one MJCF file for the bus, booms to grow on it, thrusters to drive it."""
+    """A machine: one MJCF file, booms to grow on its bus, thrusters or motors to drive it."""
 
     name: str = quantity("name")
     title: str = quantity("one line about it", "", "")
     xml: Path = quantity("MJCF file of the bus, beside the TOML file")
+    gravity: bool = quantity("whether it stands on the ground and may have gravity on", "", False)
+    equations: Equations | None = quantity(
+        "its equations of motion, in numbers independent of the MJCF", "", None
+    )
     booms: tuple[Boom, ...] = quantity("booms", "", ())
     thrusters: tuple[Thruster, ...] = quantity("thruster channels", "", ())
 

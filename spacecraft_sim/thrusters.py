@@ -1,4 +1,4 @@
-"""Relay thrusters between the controller's command and the force on the plant.
+"""Thrusters between the controller's command and the force on the plant.
 
 A command passes three stages: the delay line; the valve, which holds any level other than zero for
 the minimum on-time; and the chamber, whose thrust follows the valve linearly in the rise or fall
@@ -104,7 +104,10 @@ class Thrusters:
 
 
 def nearest_level(level: float, spec: Thruster) -> float:
-    """Returns what the relay makes of a wanted level: zero or plus or minus one of its levels.
+    """Returns what a thruster makes of a wanted level, N or N m.
+
+    A relay delivers zero or plus or minus one of its levels, a proportional thruster the wanted
+    level itself, up to its highest.
 
     Args:
         level: Wanted thrust, N or N m.
@@ -118,6 +121,8 @@ def nearest_level(level: float, spec: Thruster) -> float:
             f"thruster {spec.name!r} is commanded nan; it has the levels {spec.levels}"
         )
     wanted = min(abs(level), spec.levels[-1])
+    if spec.proportional:
+        return math.copysign(wanted, level)
     amplitude = min((0.0, *spec.levels), key=lambda x: abs(x - wanted))
     return math.copysign(amplitude, level) if amplitude else 0.0
 

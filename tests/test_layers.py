@@ -42,8 +42,18 @@ def imports(path, module):
 
 
 ONLY_IN = {
-    "mujoco": {"mjcf", "readings", "physics", "linearize", "drawing", "elastic_mjcf", "render"},
-    "dm_control": {"physics", "reduced", "task", "simulate"},
+    "mujoco": {
+        "mjcf",
+        "readings",
+        "physics",
+        "linearize",
+        "drawing",
+        "elastic_mjcf",
+        "compiled_mechanism",
+        "compiled_dynamics",
+        "render",
+    },
+    "dm_control": {"physics", "reduced", "equations", "task", "simulate"},
     "rerun": {
         "record",
         "record_chart",

@@ -21,7 +21,7 @@ def write(path: Path, base: Scenario, *, short: bool = False) -> None:
         base: The slew.
         short: Whether a few durations will do.
     """
-    model, angle = mission.assemble(base).reduced.model, base.controller["angle"]
+    model, angle = mission.assemble(base).linear_model, base.controller["angle"]
     inertia = 1 / model.gain("thruster_z", "quasi_rigid_rate_z")
     slowest = 2 * np.pi / float(model.frequencies[0])
     durations = slowest * np.linspace(1.4, 9.0, 4 if short else 60)

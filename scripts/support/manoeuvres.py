@@ -95,7 +95,7 @@ def tables(base: Scenario, duration: float, modes: int) -> Iterator[dict[str, An
         duration: T, s.
         modes: Modes that the plans leave at rest.
     """
-    model = mission.assemble(base).reduced.model
+    model = mission.assemble(base).linear_model
     least = planned(model, "min_peak", base.controller["angle"], duration, modes).peak
     inertia = 1 / model.gain("thruster_z", "quasi_rigid_rate_z")
     for profile in PROFILES:

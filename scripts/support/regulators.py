@@ -120,7 +120,7 @@ def flown(duration: float, *, tune: bool = True) -> Iterator[tuple[Row, str]]:
     scenario = mission.load_scenario(SCENARIO, (f"duration={duration}",))
     first = mission.assemble(scenario)
     spec = first.thrusters["mujoco"]["thruster_z"]
-    gain = first.reduced.model.gain("thruster_z", "quasi_rigid_rate_z")
+    gain = first.linear_model.gain("thruster_z", "quasi_rigid_rate_z")
     p0 = first.accuracy or 0.0
     yield Row(name="guaranteed", worst=p0, firings=np.nan, on_time=np.nan, impulse=np.nan), "any"
     trial = scenario.model_copy(update={"duration": min(duration, 40.0)})
