@@ -87,6 +87,13 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--exaggeration", type=float, metavar="FACTOR", help=factor)
     repair = command(_repair, "make a recording whole whose run was killed")
     repair.add_argument("file", type=Path, metavar="FILE.rrd", help="recording; it is replaced")
+    margins = command(
+        _margins, "say what delay, sampling period and torque limits a smooth law bears"
+    )
+    margins.add_argument("name", metavar="NAME", help="scenario, or path of a TOML file")
+    margins.add_argument("--out", type=Path, help="folder to write margins.json to")
+    margins.add_argument("--linear", action="store_true", help="leave out the flights")
+    margins.add_argument("--set", help="change a key of the scenario", **settings)
     export = command(_export, "write the complete MJCF of a spacecraft as one file")
     export.add_argument("name", metavar="NAME", help="spacecraft or scenario, or path of its TOML")
     export.add_argument("file", type=Path, metavar="FILE.xml", help="file to write")
@@ -294,6 +301,44 @@ def _repair(arguments: argparse.Namespace) -> int:
     words = "repaired" if repair.repair(arguments.file) else "whole already"
     print(f"{arguments.file}: {words}; it reads up to t = {repair.end(arguments.file):.6g} s")
     return HOLDS
+
+
+# -- margins ---------------------------------------------------------------------------------------
+
+
+def _margins(arguments: argparse.Namespace) -> int:
+    mission = _assemble(arguments)
+    from spacecraft_sim import margins, run_folder
+
+    settled = margins.settle(mission)
+    found = margins.margins(settled, flown=not arguments.linear)
+    table = Table("", "linear loop", "MuJoCo", title=mission.scenario.title, box=None)
+    for margin in found:
+        table.add_row(margin.name, *(f"{1e3 * x:.5g} ms" for x in (margin.linear, margin.flown)))
+    saturated = () if arguments.linear else margins.saturation(mission, _flights(arguments))
+    limits = Table("torques up to", "settled after", "distance in the end", box=None)
+    for row in saturated:
+        limits.add_row(f"{row.limit:.5g} N m", f"{row.settling:.5g} s", f"{row.distance:.3g}")
+    console = _console()
+    console.print(table)
+    if saturated:
+        console.print(limits)
+    if arguments.out:
+        folder = run_folder.create(arguments.out, mission.scenario.name)
+        run_folder.write_margins(folder, mission.scenario, found, saturated)
+        console.print(f"{folder / 'margins.json'}")
+    return HOLDS
+
+
+def _flights(arguments: argparse.Namespace) -> "Callable[[float], Mission]":
+    """What assembles the same mission with other limits of its torques, N m."""
+    from spacecraft_sim import mission
+
+    def limited(limit: float) -> "Mission":
+        settings = (*arguments.set, f"thrusters.all.levels=[{limit!r}]")
+        return mission.assemble(mission.load_scenario(arguments.name, settings))
+
+    return limited
 
 
 # -- export ----------------------------------------------------------------------------------------

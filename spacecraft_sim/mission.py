@@ -209,14 +209,15 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
         disturbances=disturbance.names,
     )
     full = build(machine)
-    plant = reduced_plant(scenario, nominal, full if machine == nominal else build(nominal))
+    known = full if machine == nominal else build(nominal)
+    plant = reduced_plant(scenario, nominal, known)
     thrusters = Thrusters(nominal.thrusters)
     name = scenario.controller["law"]
     parameters = _parameters(laws[name], scenario.controller)
-    nominal_model = full.model.ptr if machine == nominal else build(nominal).model.ptr
+    design = laws[name]
     try:
-        law, guarantees = laws[name](
-            _known_model(laws[name], plant, nominal_model), thrusters, **parameters
+        law, guarantees = design(
+            _known_model(design, plant, known.model.ptr), thrusters, **parameters
         )
     except ValueError as error:
         raise ValueError(f"{scenario.name}, law {name}: {error}") from error

@@ -104,6 +104,15 @@ class MujocoPhysics(dm_mujoco.Physics):
         """
         return self._readings.select(names)
 
+    def activations(self, channel: str) -> tuple[int, ...]:
+        """Returns the activations, thrusts of its motors, that an input sets.
+
+        Args:
+            channel: Input name.
+        """
+        place = self.inputs.index(channel)
+        return tuple(k for k, i in self._wiring if i == place)
+
     def read(self) -> list[float]:
         """Returns all readings in the order of `units`."""
         return self._all()

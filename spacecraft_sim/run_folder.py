@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from spacecraft_sim import config
 from spacecraft_sim.chart import Map, charts_of
 from spacecraft_sim.compare import Comparison
 from spacecraft_sim.guarantee import Assumption, Verdict
+from spacecraft_sim.margins import Margin, Saturation
 from spacecraft_sim.mission import Mission
 from spacecraft_sim.scenario import Scenario
 from spacecraft_sim.trajectory import Trajectory
@@ -104,6 +106,27 @@ def subject(mission: Mission) -> "Subject":
         band=mission.accuracy,
         charts=charts_of(mission.controller),
     )
+
+
+def write_margins(
+    folder: Path, scenario: Scenario, found: Sequence[Margin], saturated: Sequence[Saturation]
+) -> None:
+    """Writes `margins.json`, times in s.
+
+    Args:
+        folder: The folder.
+        scenario: The scenario.
+        found: Delay and sampling periods.
+        saturated: Flights with limited torques.
+    """
+    table = {
+        "scenario": scenario.name,
+        "margins": [{k: _number(v) for k, v in asdict(margin).items()} for margin in found],
+        "saturation": [{k: _number(v) for k, v in asdict(row).items()} for row in saturated],
+        "versions": versions(),
+    }
+    text = json.dumps(table, indent=2, allow_nan=False, ensure_ascii=False)
+    (folder / "margins.json").write_text(text + "\n", encoding="utf-8")
 
 
 def write_pictures(
