@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from controllers.contour import Contour, Rates, contraction, guaranteed_accuracy, kappa
+from controllers.accuracy_map import equal_kappa, low_d, unit_contraction
+from controllers.contour import Contour, guaranteed_accuracy
 from controllers.dimensionless import Scale
 from spacecraft_sim.chart import Line, Map, Portrait, Region
 from spacecraft_sim.switching_curves import Curve, Relay, position
@@ -117,11 +118,8 @@ def parameter_map(F: float, eps: float, *, axis: str) -> Map:
     mastered = Region(
         name="finite accuracy: e < F, F + e < 1", outline=np.array([[0, 0], [1, 0], [0.5, 0.5]])
     )
-    borders = {
-        "k = 1": lambda F, e: contraction(F, e) - 1,
-        "kappa1 = kappa2": lambda F, e: kappa(F, e)[0] - kappa(F, e)[1],
-        "D low above": _d_low,
-    }
+    borders = {"k = 1": unit_contraction, "kappa1 = kappa2": equal_kappa, "D low above": low_d}
+    across = np.linspace(0.02, 0.98, 97).tolist()
     return Map(
         name=f"parameters_{axis}",
         title=f"Parameters of the axis {axis}: p0 = {guaranteed_accuracy(F, eps):.4g} u0 Dt²"
@@ -129,28 +127,9 @@ def parameter_map(F: float, eps: float, *, axis: str) -> Map:
         else f"Parameters of the axis {axis}",
         labels=("F/u0, steady disturbance over thrust", "e/u0, unsteady disturbance over thrust"),
         point=(F, eps),
-        lines=tuple(Line(name=name, points=_border(f)) for name, f in borders.items()),
+        lines=tuple(
+            Line(name=name, points=np.array([(x, border(x)) for x in across]))
+            for name, border in borders.items()
+        ),
         regions=(mastered, optimal),
     )
-
-
-def _d_low(F: float, eps: float) -> float:
-    """Positive where D lies on the lower arc: p0 > dp/(4 am)."""
-    r = Rates(F + eps, F - eps, 1 - F - eps, 1 - F + eps)
-    return guaranteed_accuracy(F, eps) - r.dp / (4 * r.am)
-
-
-def _border(function: Callable[[float, float], float]) -> Array:
-    """The e at which a function of (F, e) changes its sign, for F from 0 to 1; NaN where none."""
-    points = []
-    for F in np.linspace(0.02, 0.98, 97).tolist():
-        low, high = 1e-9, min(F, 1 - F) * (1 - 1e-9)
-        first, last = function(F, low), function(F, high)
-        if first * last > 0:
-            points.append((F, math.nan))
-            continue
-        for _ in range(30):
-            middle = (low + high) / 2
-            low, high = (middle, high) if function(F, middle) * first > 0 else (low, middle)
-        points.append((F, (low + high) / 2))
-    return np.array(points)

@@ -80,12 +80,14 @@ def first_not_positive(function: Callable[[float], float], points: Sequence[Poin
     """
     *earlier, a, b = points
     third = earlier[-1] if earlier else None
-    width = max(WIDTH, 4 * math.ulp(b[0]))
-    for k in range(100):
+    width, before = max(WIDTH, 4 * math.ulp(b[0])), math.inf
+    for _ in range(100):
         span = b[0] - a[0]
         if span <= width or -b[1] <= width * (a[1] - b[1]) / span:
             break
-        step = span / 2 if k % 5 == 4 else _root_of_parabola(a, b, third)
+        # Where the last step did not halve the bracket, the function is no parabola.
+        step = span / 2 if span > before / 2 else _root_of_parabola(a, b, third)
+        before = span
         t = a[0] + min(max(step + width / 2, width / 2), span - width / 2)
         point = (t, function(t))
         if point[1] > 0:
