@@ -261,6 +261,9 @@ def _difference_line(comparison: "Comparison") -> str:
         if axes:
             worst = max(axes, key=lambda d: d.max_error)
             parts.append(f"{worst.signal} {worst.max_error:.3g} {worst.unit}")
+    if not parts:  # no such signals: the readings that differ most
+        worst = sorted(comparison.differences, key=lambda d: -d.max_error)[:3]
+        parts = [f"{d.signal} {d.max_error:.3g} {d.unit}" for d in worst]
     return "MuJoCo minus reduced model, at most: " + ", ".join(parts)
 
 

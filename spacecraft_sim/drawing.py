@@ -159,13 +159,15 @@ def cross(a: Array, b: Array) -> Array:
 def channel_units(trajectory: Trajectory, drawing: Drawing) -> dict[str, str]:
     """Returns the thruster channels of a flight with their units: the jets tell N from N m.
 
+    What drives a joint is a torque.
+
     Args:
         trajectory: The flight.
         drawing: Its drawing.
     """
     names = [name for name in trajectory.signals if f"{name}_command" in trajectory.signals]
     known = {jet.channel: "N" if np.any(jet.force) else "N m" for jet in drawing.jets}
-    return {name: known.get(name, trajectory.units[name]) for name in names}
+    return {name: known.get(name, "N m") for name in names}
 
 
 _KINDS = {

@@ -1,4 +1,4 @@
-"""The reduced plant of machines with equations of motion: Lagrange's, or those of Euler and Poisson.
+"""The reduced plant of machines with equations of motion: of Lagrange, or of Euler and Poisson.
 
 They are integrated by DOP853, an order and an author apart from MuJoCo's RK4, over pieces in which
 every input is a straight line in time, so the same law object flies on both.  The numbers are those

@@ -21,6 +21,8 @@ _UPPER = 3.0  # longest sampling period looked at, s
 _FINE = 20  # samples in a delay, where continuous time is meant
 _KICK = 1e-6  # disturbance of each velocity, rad/s
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05)  # of the largest torque, to which it is limited
+# A slower motion that decays may hide one that grows: flights last so many of its time constants.
+_CONSTANTS, _LONGEST = 8, 150.0  # the latter in s
 _NEWTON = 3  # rounds: from 1e-3 of the scale to rounding
 _CYCLES = 30  # of the critical oscillation in a flight
 _BRACKET, _ROUNDS = 0.15, 7  # about the linear figure, where MuJoCo's is looked for
@@ -132,7 +134,8 @@ def margins(settled: Settled, *, flown: bool = True) -> tuple[Margin, ...]:
     found = [Margin(name="delay", linear=delay, flown=math.nan)]
     if flown and math.isfinite(delay):
         found[0] = replace(
-            found[0], flown=_flown(lambda x: _growth(settled, x / _FINE, x, frequency), delay)
+            found[0],
+            flown=_flown(lambda x: _growth(settled, x / _FINE, _rest_of(x), frequency), delay),
         )
     holds = HOLDS if settled.law.filter.cutoffs else ("held torque",)
     for hold in holds:
@@ -201,7 +204,9 @@ def _growth(settled: Settled, period: float, delay: float, frequency: float) -> 
     """Rate at which a small disturbance grows, fitted over the second half of a flight, 1/s."""
     physics, law = settled.physics, settled.law
     cycle = 2 * math.pi / frequency if math.isfinite(frequency) else 50 * period
-    steps = math.ceil(_CYCLES * max(cycle, 4 * period) / period)
+    slowest = -max(x.real for x in settled.loop.eigenvalues().tolist())
+    duration = max(_CYCLES * max(cycle, 4 * period), min(_CONSTANTS / slowest, _LONGEST))
+    steps = math.ceil(duration / period)
     decay, gain = law.filter.coefficients(period)
     filter_ = replace(law.filter, period=period, decay=decay, gain=gain)
     with physics.reset_context():
@@ -239,6 +244,11 @@ def _growth(settled: Settled, period: float, delay: float, frequency: float) -> 
     if len(peaks) < 3 or not np.all(peaks > 0):
         return -math.inf
     return float(np.polyfit(np.arange(len(peaks)) * window * period, np.log(peaks), 1)[0])
+
+
+def _rest_of(delay: float) -> float:
+    """A delay without that of the hold, which is half a sampling period."""
+    return delay * (1 - 0.5 / _FINE)
 
 
 def _target(settled: Settled) -> list[float]:

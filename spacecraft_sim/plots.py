@@ -20,6 +20,7 @@ from spacecraft_sim.trajectory import Trajectory, moving_axes
 
 Array = np.ndarray
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
+Panel = Callable[[Axes, Flights, bool], None]  # draws the whole flight, or its end
 
 WIDTH, DPI, FRAMES = 18.0, 100, 6  # inches, dots an inch, pictures in the film strip
 PLANTS = (("reduced", "#f29b38", 3.2), ("MuJoCo", "#1f6fd6", 1.2))  # the thin over the wide line
@@ -39,6 +40,7 @@ def summary(
     verdicts: Sequence[Verdict],
     title: str,
     band: float | None = None,
+    histories: Sequence[Panel] | None = None,
 ) -> None:
     """Draws what happened on one page of about 1800 x 1200 pixels.
 
@@ -50,6 +52,7 @@ def summary(
         verdicts: What became of the guarantees on the full plant.
         title: One line over the page.
         band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
+        histories: Four panels in place of those of the quasi-rigid motion.
     """
     channels = channel_units(measured, drawing)
     lanes = max(1.0, 0.42 * len(channels))  # inches
@@ -69,6 +72,10 @@ def summary(
         start = late if zoom else measured.time[0]
         flights = _since(predicted, start), _since(measured, start)
         panels = [figure.add_subplot(cell) for cell in _grid(figure, row, 4, 0.05, 0.19)]
+        if histories:
+            for draw, axes in zip(histories, panels, strict=True):
+                draw(axes, flights, zoom)
+            continue
         _angle(panels[0], flights, band or 0.0, zoom)
         _attitude(panels[1], flights, band or 0.0, zoom)
         _tips(panels[2], flights, tuple(drawing.booms))

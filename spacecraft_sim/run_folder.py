@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spacecraft_sim import config
-from spacecraft_sim.chart import Map, charts_of
+from spacecraft_sim.chart import Portrait, charts_of
 from spacecraft_sim.compare import Comparison
 from spacecraft_sim.guarantee import Assumption, Verdict
 from spacecraft_sim.margins import Margin, Saturation
@@ -145,10 +145,11 @@ def write_pictures(
         predicted: Flight of the reduced plant.
         comparison: How it came out.
     """
-    from spacecraft_sim import drawing, plots, plots_chart, report
+    from spacecraft_sim import drawing, plots, plots_chart, plots_smooth, report
 
     title, charts = mission.scenario.title, charts_of(mission.controller)
     drawn = drawing.draw(mission.mujoco.model.ptr, mission.machine, measured)
+    rigid = any(name.startswith("quasi_rigid_angle") for name in predicted.signals)
     plots.summary(
         folder / "summary.png",
         measured=measured,
@@ -157,8 +158,9 @@ def write_pictures(
         verdicts=comparison.verdicts,
         title=title,
         band=mission.accuracy,
+        histories=None if rigid else plots_smooth.panels(measured),
     )
-    if any(isinstance(chart, Map) for chart in charts):
+    if any(not isinstance(chart, Portrait) for chart in charts):
         plots_chart.page(folder / "charts.png", measured=measured, charts=charts, title=title)
     report.write(
         folder / "report.html",

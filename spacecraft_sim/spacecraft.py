@@ -1,4 +1,4 @@
-"""A machine as plain validated data: its MJCF, its booms, its thrusters, its equations of motion."""
+"""A machine as plain validated data: its MJCF, its booms, thrusters and equations of motion."""
 
 from pathlib import Path
 from typing import Annotated, Any, Literal

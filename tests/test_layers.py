@@ -62,7 +62,7 @@ ONLY_IN = {
         "record_signals",
         "repair",
     },
-    "matplotlib": {"plots", "plots_chart", "plots_film"},
+    "matplotlib": {"plots", "plots_chart", "plots_film", "plots_smooth"},
     "controllers": {"mission", "cli"},
 }
 
