@@ -22,7 +22,7 @@ _FINE = 20  # samples in a delay, where continuous time is meant
 _KICK = 1e-6  # disturbance of each velocity, rad/s
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05)  # of the largest torque, to which it is limited
 # A slower motion that decays may hide one that grows: flights last so many of its time constants.
-_CONSTANTS, _LONGEST = 8, 150.0  # the latter in s
+_CONSTANTS, _LONGEST = 14, 150.0  # the latter in s
 _NEWTON = 3  # rounds: from 1e-3 of the scale to rounding
 _CYCLES = 30  # of the critical oscillation in a flight
 _BRACKET, _ROUNDS = 0.15, 7  # about the linear figure, where MuJoCo's is looked for
@@ -80,6 +80,12 @@ def settle(mission: Any) -> Settled:
             "linearised"
         )
     t = float(mission.fly().time[-1])
+    y, still = physics.select(law.sensors)(), [0.0] * len(law.filter.cutoffs)
+    if law.formula.command(t, y, still) != law.formula.command(t + 0.1, y, still):
+        raise ValueError(
+            f"{mission.scenario.name}: not settled, the law follows a motion; make its programme "
+            "constant: controller.programme.amplitude=[0.0, ..]"
+        )
     dynamics = compiled_dynamics.dynamics_at(physics, law.thrusters)
     dynamics = replace(dynamics, qvel=_steady(physics))
     N = compiled_dynamics.basis(dynamics.model, without=_unseen(physics, law))

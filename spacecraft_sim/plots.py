@@ -20,7 +20,6 @@ from spacecraft_sim.trajectory import Trajectory, moving_axes
 
 Array = np.ndarray
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
-Panel = Callable[[Axes, Flights, bool], None]  # draws the whole flight, or its end
 
 WIDTH, DPI, FRAMES = 18.0, 100, 6  # inches, dots an inch, pictures in the film strip
 PLANTS = (("reduced", "#f29b38", 3.2), ("MuJoCo", "#1f6fd6", 1.2))  # the thin over the wide line
@@ -40,7 +39,7 @@ def summary(
     verdicts: Sequence[Verdict],
     title: str,
     band: float | None = None,
-    histories: Sequence[Panel] | None = None,
+    histories: Sequence[Callable[[Axes, Flights, bool], None]] | None = None,
 ) -> None:
     """Draws what happened on one page of about 1800 x 1200 pixels.
 

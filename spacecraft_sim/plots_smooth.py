@@ -1,13 +1,16 @@
 """Panels of a flight's page for machines without a quasi-rigid motion: arms and turning bodies."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from spacecraft_sim.plots import BOOMS, PLANTS, WHEN, Flights, Panel, panel, prefix
+from spacecraft_sim.plots import PLANTS, Flights, panel, prefix
+from spacecraft_sim.plots_film import BOOMS
 from spacecraft_sim.trajectory import Trajectory
 
+Panel = Callable[[Axes, Flights, bool], None]  # draws the whole flight, or its end
+WHEN = ("whole flight", "end of the flight")
 _SHOWN = 9  # curves that a panel can carry
 
 

@@ -98,6 +98,8 @@ def reduced(subject: Subject, flight: Trajectory, factor: float | None = None) -
         factor = suited_factor(flight, {boom.name: boom.length for boom in machine.booms})
 
     def frames(part: Trajectory, beside: Frames, over: Trajectory) -> Frames:
+        if BUS not in rest.positions:  # an arm: the readings of its equations place no body
+            return Frames(time=part.time, positions={}, quaternions={}, booms={})
         return ghost(machine, rest, beside, over, factor).frames(part, beside)
 
     return Beneath(
