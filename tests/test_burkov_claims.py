@@ -131,17 +131,15 @@ def test_laws_are_frozen_pure_and_picklable(flown):
 # -- what is broken shows ----------------------------------------------------------------------
 
 
-def test_an_undamped_flight_breaks_the_claims():
-    law, claims = cases.position(period=4e-3)
+def test_a_flight_that_gains_energy_breaks_the_claims():
+    law, (falls, _, stays) = cases.position(period=4e-3)
     wrong = replace(law, formula=replace(law.formula, K2=(-60.0, -25.0)))
     start = np.array([*cases.TARGET, 0.5, -0.5])
-    (run,) = fly(ARM, wrong, starts=start, duration=9.0)
-    falls, ends, stays = (claim.check(run) for claim in claims)
-    assert not falls.holds
-    assert falls.measured > 2 * falls.bound
-    assert not ends.holds
-    assert not stays.holds
-    assert not any((falls.failed, ends.failed, stays.failed))
+    (run,) = fly(ARM, wrong, starts=start, duration=1.2)
+    for verdict in (falls.check(run), stays.check(run)):
+        assert not verdict.holds
+        assert not verdict.failed
+        assert verdict.measured > 1.2 * verdict.bound
 
 
 def test_the_certified_basin_is_a_hypothesis_of_the_end_alone():
