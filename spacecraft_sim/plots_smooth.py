@@ -52,7 +52,8 @@ def _curves(title: str, names: Sequence[str], measured: Trajectory) -> Panel:
             )
         axes.set_xlim(flights[1].time[0], flights[1].time[-1])
         unit = "N m" if title == "Torques" else measured.units[names[0]] if names else ""
-        panel(axes, f"{title}, {WHEN[zoom]}", "time, s", f"{letter}{unit}" or "component")
+        words = f"{title}, {WHEN[zoom]}; time in s"
+        panel(axes, words, "", f"{letter}{unit}" or "component", below=True)
 
     return draw
 
@@ -69,8 +70,7 @@ def _difference(names: Sequence[str], measured: Trajectory) -> Panel:
                 time, gap, color=BOOMS[k % len(BOOMS)], linewidth=1.0, label=name.replace("_", " ")
             )
         unit = measured.units[names[0]] if names else ""
-        panel(
-            axes, f"MuJoCo minus reduced, {WHEN[zoom]}", "time, s", f"|difference|, {unit or '1'}"
-        )
+        words = f"MuJoCo minus reduced, {WHEN[zoom]}; time in s"
+        panel(axes, words, "", f"|difference|, {unit or '1'}", below=True)
 
     return draw

@@ -121,6 +121,20 @@ def test_close_to_the_degenerate_case(sign, exponent):
     assert plan.peak == pytest.approx(4 / T**2, rel=10.0**-exponent)
 
 
+@pytest.mark.parametrize("damping", [0.0, 1e-9, 1e-6])
+@pytest.mark.parametrize("excess", [3e-12, 1e-10, 1e-8, 0.2])
+def test_bounds_close_to_the_degenerate_case(damping, excess):
+    asked = {"omega": 1.0, "damping": damping, "duration": 4 * math.pi, "x1": 1.0}
+    peak = min_peak(**asked)
+    assert peak.peak == pytest.approx(4 / asked["duration"] ** 2, rel=1e-10)
+    plan = min_fuel(**asked, bound=peak.peak * (1 + excess))
+    assert plan.residual < 1e-11
+    # One pause: (m0/2)(a^2 - g^2) and 2 m0 a for thrust of a at either end, a gap of 2 g.
+    if excess < 1e-3:
+        shorter = 1 - math.sqrt(1 - 1 / (1 + excess))
+        assert plan.fuel == pytest.approx(peak.fuel * (1 + excess) * shorter, rel=1e-5)
+
+
 def test_a_duration_typed_in_by_hand():
     for T in (12.56, 12.566, 12.5664, 12.56637):
         assert min_peak(omega=1.0, damping=0.0, duration=T, x1=1.0).residual < 2e-11
@@ -150,6 +164,19 @@ def test_little_more_than_the_least_peak(name):
     # Pauses open as the root of the excess, to first order; there are digits for no more at 1e-11.
     assert saved[1] == pytest.approx(2 * saved[0], rel=1e-2)
     assert saved[3] == pytest.approx(2 * saved[2], rel=2e-3)
+
+
+def test_little_more_than_the_least_peak_with_four_modes():
+    omega = np.array([1.4139389795584567, 2.925922927995304, 5.009611269853789, 12.18049087095138])
+    zeta = np.array([0.000233, 0.004153, 0.0825, 0.001466])
+    asked = {
+        "omega": omega, "damping": 2 * zeta * omega, "duration": 21.66292009683103,
+        "x1": -0.3003, "v0": 0.00467, "v1": 0.03538,
+    }  # fmt: skip
+    peak = min_peak(**asked)
+    plan = min_fuel(**asked, bound=peak.peak * (1 + 1e-9))
+    assert plan.residual < 1e-11
+    assert len(plan.switch_times) == 2 * len(peak.switch_times)
 
 
 @pytest.mark.parametrize("ratio", [10, 1e2, 1e3])

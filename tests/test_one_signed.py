@@ -26,6 +26,7 @@ def test_a_spin_up_costs_its_change_of_rate(ratio, turn):
     assert not plan.normal
     assert plan.fuel == pytest.approx(0.2, rel=1e-11)
     assert set(np.round(turn * plan.levels / bound, 12)) == {0.0, 1.0}
+    assert not np.any(np.signbit(plan.levels[plan.levels == 0]))
     assert plan.residual < 1e-13 * ratio + 1e-13  # an ulp of an edge counts with the level
     assert plan.multipliers == pytest.approx([0, turn, 0, 0], abs=1e-12)
 
