@@ -222,14 +222,17 @@ def rigid_time(*, bound: float, x0: float, v0: float, x1: float, v1: float) -> f
         v1: x' at the end, per s.
     """
     times = []
+    scale = bound * abs(x1 - x0) + v0**2 + v1**2
     for sign in (1.0, -1.0):  # of the first pulse
         square = sign * bound * (x1 - x0) + (v0**2 + v1**2) / 2  # of the rate where it turns
-        if square >= 0:
-            # Either root: the rate may turn short of zero.
-            for turn in (math.sqrt(square), -math.sqrt(square)):
-                first, second = sign * (turn - v0) / bound, sign * (turn - v1) / bound
-                if first >= 0 and second >= 0:
-                    times.append(first + second)
+        if square < -1e-15 * scale:
+            continue
+        root = math.sqrt(max(square, 0.0))
+        for turn in (root, -root):  # the rate may turn short of zero
+            pulses = sign * (turn - v0) / bound, sign * (turn - v1) / bound
+            # A pulse of no length may come out negative, by the root of the rounding error.
+            if min(pulses) * bound >= -1e-7 * math.sqrt(scale):
+                times.append(sum(max(x, 0.0) for x in pulses))
     return min(times)
 
 

@@ -6,7 +6,6 @@ Heavy modules are imported by the commands that need them.
 
 import argparse
 import gc
-import math
 import os
 import sys
 import traceback
@@ -15,19 +14,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.markup import escape
-from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from spacecraft_sim.versions import require_supported_mujoco
+from spacecraft_sim import cli_tools, terminal
+from spacecraft_sim.terminal import BAD_INPUT, BROKEN, FAILS, HOLDS
 
 if TYPE_CHECKING:
     from spacecraft_sim.compare import Comparison
     from spacecraft_sim.mission import Mission
     from spacecraft_sim.plant import PlantName
     from spacecraft_sim.trajectory import Trajectory
-
-HOLDS, FAILS, BAD_INPUT, BROKEN = 0, 1, 2, 3
 
 # The matrices are small: threads of the linear algebra would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -80,32 +77,32 @@ def _parser() -> argparse.ArgumentParser:
     shown = "show the flight in a viewer that is open on this machine; 127.0.0.1:9876 if left out"
     live.add_argument("--connect", nargs="?", const="", metavar="ADDRESS", help=shown)
     live.add_argument("--spawn", action="store_true", help="show the flight in a new viewer")
-    compare = command(_compare, "put two runs in one recording, one figure and one table")
+    compare = command(cli_tools.compare, "put two runs in one recording, one figure and one table")
     compare.add_argument("a", type=Path, metavar="A", help="folder of a run")
     compare.add_argument("b", type=Path, metavar="B", help="folder of another")
     compare.add_argument("--out", type=Path, help="folder to write; default runs/A-and-B, numbered")
     compare.add_argument("--exaggeration", type=float, metavar="FACTOR", help=factor)
-    repair = command(_repair, "make a recording whole whose run was killed")
+    repair = command(cli_tools.repair, "make a recording whole whose run was killed")
     repair.add_argument("file", type=Path, metavar="FILE.rrd", help="recording; it is replaced")
     margins = command(
-        _margins, "say what delay, sampling period and torque limits a smooth law bears"
+        cli_tools.margins, "say what delay, sampling period and torque limits a smooth law bears"
     )
     margins.add_argument("name", metavar="NAME", help="scenario, or path of a TOML file")
     margins.add_argument("--out", type=Path, help="folder to write margins.json to")
     margins.add_argument("--linear", action="store_true", help="leave out the flights")
     margins.add_argument("--set", help="change a key of the scenario", **settings)
-    export = command(_export, "write the complete MJCF of a spacecraft as one file")
+    export = command(cli_tools.export, "write the complete MJCF of a spacecraft as one file")
     export.add_argument("name", metavar="NAME", help="spacecraft or scenario, or path of its TOML")
     export.add_argument("file", type=Path, metavar="FILE.xml", help="file to write")
     video = command(
-        _video, "render the flight in the folder of a run with MuJoCo, without a display"
+        cli_tools.video, "render the flight in the folder of a run with MuJoCo, without a display"
     )
     video.add_argument("folder", type=Path, metavar="RUN_FOLDER", help="folder that `run` wrote")
     video.add_argument("--camera", metavar="NAME", help="camera of the machine's scene.xml")
     video.add_argument("--fps", type=float, default=25.0, help="frames a second; default 25")
     video.add_argument("--speed", type=float, help="simulated over shown time; default: about 30 s")
     video.add_argument("--out", type=Path, metavar="FILE", help=".webp or .mp4 file to write")
-    command(_doctor, "say what this machine can do, what is missing, and what to install")
+    command(cli_tools.doctor, "say what this machine can do, what is missing, and what to install")
     return parser
 
 
@@ -131,7 +128,7 @@ def _list(_: argparse.Namespace) -> int:
     table.add_row("[bold]laws[/]")
     for name, design in REGISTRY.items():
         table.add_row(f"  {name}", (design.__doc__ or "").partition("\n")[0])
-    _console().print(table)
+    terminal.console().print(table)
     return HOLDS
 
 
@@ -139,11 +136,11 @@ def _list(_: argparse.Namespace) -> int:
 
 
 def _explain(arguments: argparse.Namespace) -> int:
-    mission = _assemble(arguments)
+    mission = terminal.assemble(arguments)
     from controllers import REGISTRY
     from spacecraft_sim import explain
 
-    console = _console()
+    console = terminal.console()
     scenario = mission.scenario
     console.print(f"[bold]{scenario.name}[/]: {scenario.title}\n\n{scenario.description.strip()}\n")
     law = REGISTRY[scenario.controller["law"]]
@@ -171,10 +168,10 @@ def _fill(table: Table, rows: Sequence[Sequence[str]]) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    mission = _assemble(arguments)
+    mission = terminal.assemble(arguments)
     from spacecraft_sim import run_folder, viewer
 
-    factor = _exaggeration(arguments)
+    factor = terminal.exaggeration(arguments)
     address = viewer.spawn() if arguments.spawn else viewer.found(arguments.connect)
     folder = run_folder.create(arguments.out, mission.scenario.name)
     try:
@@ -199,7 +196,7 @@ def _run(arguments: argparse.Namespace) -> int:
         traceback.print_exc()
         print(f"spacecraft-sim: the run crashed; what it wrote is in {folder}", file=sys.stderr)
         return BROKEN
-    console = _console()
+    console = terminal.console()
     console.print(_verdict_table(comparison))
     console.print(_difference_line(comparison))
     console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
@@ -269,161 +266,6 @@ def _difference_line(comparison: "Comparison") -> str:
 
 def _figure(value: float | None, unit: str) -> str:
     return "" if value is None else f"{value:.6g} {unit}"
-
-
-# -- compare ---------------------------------------------------------------------------------------
-
-
-def _compare(arguments: argparse.Namespace) -> int:
-    require_supported_mujoco()
-    from spacecraft_sim import run_folder, run_pair
-
-    factor = _exaggeration(arguments)
-    compared = run_pair.pair(run_pair.read(arguments.a), run_pair.read(arguments.b))
-    name = f"{arguments.a.resolve().name}-and-{arguments.b.resolve().name}"
-    folder = run_folder.create(arguments.out, name)
-    run_folder.write_pair(folder, compared, factor)
-    table = Table("", "A", "B", "B - A", box=None)
-    for heading, rows in run_pair.table(compared):
-        table.add_row(f"[bold]{heading}[/]")
-        for what, *values in rows or [("none",)]:
-            table.add_row(f"  {escape(what)}", *values)
-    console = _console()
-    console.print(table)
-    console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
-    console.print(f"open the recording:  rerun {folder / 'recording.rrd'}", highlight=False)
-    return HOLDS
-
-
-# -- repair ----------------------------------------------------------------------------------------
-
-
-def _repair(arguments: argparse.Namespace) -> int:
-    from spacecraft_sim import repair
-
-    words = "repaired" if repair.repair(arguments.file) else "whole already"
-    print(f"{arguments.file}: {words}; it reads up to t = {repair.end(arguments.file):.6g} s")
-    return HOLDS
-
-
-# -- margins ---------------------------------------------------------------------------------------
-
-
-def _margins(arguments: argparse.Namespace) -> int:
-    mission = _assemble(arguments)
-    from spacecraft_sim import margins, run_folder
-
-    settled = margins.settle(mission)
-    found = margins.margins(settled, flown=not arguments.linear)
-    table = Table("", "linear loop", "MuJoCo", title=mission.scenario.title, box=None)
-    for margin in found:
-        table.add_row(margin.name, *(f"{1e3 * x:.5g} ms" for x in (margin.linear, margin.flown)))
-    saturated = () if arguments.linear else margins.saturation(mission, _flights(arguments))
-    limits = Table("torques up to", "settled after", "distance in the end", box=None)
-    for row in saturated:
-        limits.add_row(f"{row.limit:.5g} N m", f"{row.settling:.5g} s", f"{row.distance:.3g}")
-    console = _console()
-    console.print(table)
-    if saturated:
-        console.print(limits)
-    if arguments.out:
-        folder = run_folder.create(arguments.out, mission.scenario.name)
-        run_folder.write_margins(folder, mission.scenario, found, saturated)
-        console.print(f"{folder / 'margins.json'}")
-    return HOLDS
-
-
-def _flights(arguments: argparse.Namespace) -> "Callable[[float], Mission]":
-    """What assembles the same mission with other limits of its torques, N m."""
-    from spacecraft_sim import mission
-
-    def limited(limit: float) -> "Mission":
-        settings = (*arguments.set, f"thrusters.all.levels=[{limit!r}]")
-        return mission.assemble(mission.load_scenario(arguments.name, settings))
-
-    return limited
-
-
-# -- export ----------------------------------------------------------------------------------------
-
-
-def _export(arguments: argparse.Namespace) -> int:
-    require_supported_mujoco()
-    from spacecraft_sim import config, library, mjcf, spacecraft
-
-    name = arguments.name
-    own = name.endswith(".toml") and "spacecraft" in config.read(Path(name))
-    if own or name in library.scenario_names():
-        from spacecraft_sim import mission
-
-        scenario = mission.load_scenario(name)
-        machine = spacecraft.load(scenario.spacecraft).with_parts(**scenario.changes())
-    else:
-        machine = spacecraft.load(name)
-    if arguments.file.exists():
-        raise ValueError(f"{arguments.file}: exists already; name a file that does not")
-    try:
-        mjcf.export(machine, arguments.file)
-    except OSError as error:
-        raise ValueError(f"{arguments.file}: cannot be written: {error.strerror}") from error
-    _console().print(f"{arguments.file}: {machine.title}")
-    return HOLDS
-
-
-# -- video, doctor ---------------------------------------------------------------------------------
-
-
-def _video(arguments: argparse.Namespace) -> int:
-    from spacecraft_sim import video
-
-    console = Console(stderr=True)
-    columns = TextColumn("rendering"), MofNCompleteColumn(), TextColumn("frames")
-    watched = console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=not watched) as progress:
-        task = progress.add_task("", total=None)
-        written = video.write(
-            arguments.folder,
-            camera=arguments.camera,
-            fps=arguments.fps,
-            speed=arguments.speed,
-            out=arguments.out,
-            progress=lambda done, total: progress.update(task, completed=done, total=total),
-        )
-    _console().print(f"{written}: {written.stat().st_size / 1e6:.2f} MB", highlight=False)
-    return HOLDS
-
-
-def _doctor(_: argparse.Namespace) -> int:
-    from spacecraft_sim import doctor
-
-    table = Table("", "what", "found", "to do", box=None, pad_edge=False, header_style="bold")
-    marks = {"ok": "[green]ok[/]", "limited": "[yellow]limited[/]", "missing": "[red]missing[/]"}
-    for check in doctor.checks():
-        table.add_row(marks[check.state], check.subject, escape(check.found), escape(check.advice))
-    _console().print(table)
-    return HOLDS
-
-
-# -- shared ----------------------------------------------------------------------------------------
-
-
-def _assemble(arguments: argparse.Namespace) -> "Mission":
-    require_supported_mujoco()
-    from spacecraft_sim import mission
-
-    return mission.assemble(mission.load_scenario(arguments.name, tuple(arguments.set)))
-
-
-def _exaggeration(arguments: argparse.Namespace) -> float | None:
-    factor = arguments.exaggeration
-    if factor is not None and not 0 < factor < math.inf:
-        raise ValueError(f"--exaggeration {factor:g}: must be a positive number, such as 10")
-    return factor
-
-
-def _console() -> Console:
-    """Tables keep their width when the output is a file or a pipe."""
-    return Console(width=None if sys.stdout.isatty() else 180)
 
 
 if __name__ == "__main__":

@@ -50,18 +50,18 @@ STRETCHED = np.r_[0.3, -0.4, 0.2, 0.5, -0.6, 0.3, 0.5, -0.5, 0.3, 0.2, 0.1, -0.1
 
 # Design, plant, start, duration; periods of some ms, so that the flights are short to compute.
 CASES = {
-    "(2.1)": (lambda: cases.position(period=4e-3), ARM, np.array([2.5, -2.0, 1.0, -2.0]), 9.0),
+    "(2.1)": (lambda: cases.position(period=8e-3), ARM, np.array([2.5, -2.0, 1.0, -2.0]), 9.0),
     "(2.4)": (
-        lambda: cases.position(gravity="at the target", period=4e-3),
+        lambda: cases.position(gravity="at the target", period=8e-3),
         ARM, np.array([1.2, -0.5, 0.5, 0.5]), 9.0,
     ),
-    "(3.1)": (lambda: cases.path(period=4e-3), ARM, MOVING, 9.0),
-    "(3.7)": (lambda: cases.path(feedforward=False, period=4e-3), ARM, MOVING, 9.0),
-    "(4.2)": (lambda: cases.flexible(period=2e-3), FLEXIBLE, STRETCHED, 13.0),
-    "(5.4)": (lambda: cases.vectors(rated=True, period=2e-2), BODY, near_the_goal(), 36.0),
-    "(5.8)": (lambda: cases.vectors(rated=False, period=2e-2), BODY, near_the_goal(), 46.0),
-    "(5.18)": (lambda: spin(period=2e-2), BODY, spinning(1.5), 110.0),
-    "(5.20)": (lambda: two(period=2e-2), BODY, spinning(0.4), 90.0),
+    "(3.1)": (lambda: cases.path(period=8e-3), ARM, MOVING, 9.0),
+    "(3.7)": (lambda: cases.path(feedforward=False, period=8e-3), ARM, MOVING, 9.0),
+    "(4.2)": (lambda: cases.flexible(period=5e-3), FLEXIBLE, STRETCHED, 13.0),
+    "(5.4)": (lambda: cases.vectors(rated=True, period=4e-2), BODY, near_the_goal(), 36.0),
+    "(5.8)": (lambda: cases.vectors(rated=False, period=4e-2), BODY, near_the_goal(), 46.0),
+    "(5.18)": (lambda: spin(period=6e-2), BODY, spinning(1.5), 110.0),
+    "(5.20)": (lambda: two(period=6e-2), BODY, spinning(0.4), 90.0),
 }  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def test_laws_are_frozen_pure_and_picklable(flown):
 
 
 def test_a_flight_that_gains_energy_breaks_the_claims():
-    law, (falls, _, stays) = cases.position(period=4e-3)
+    law, (falls, _, stays) = cases.position(period=8e-3)
     wrong = replace(law, formula=replace(law.formula, K2=(-60.0, -25.0)))
     start = np.array([*cases.TARGET, 0.5, -0.5])
     (run,) = fly(ARM, wrong, starts=start, duration=1.2)
@@ -162,7 +162,7 @@ def test_starts_in_the_certified_basin_never_come_near_another_equilibrium():
     attitudes = [turned(cases.goal(), v) for v in random.normal(size=(40, 3)) * 0.6]
     starts = BODY.state(rate=random.normal(size=(40, 3)) * 0.3, attitude=np.array(attitudes))
     count = 0
-    for run in fly(BODY, law, starts=starts, duration=12.0):
+    for run in fly(BODY, law, starts=starts, duration=6.0):
         verdict = stays.check(run)
         assert verdict.holds
         if verdict.bound < math.sqrt(2 * 2.4 / 1.2):  # V(0) < 2 min(k2, k3)
@@ -178,10 +178,10 @@ def test_how_much_v_may_rise_between_samples(hold):
     law, (falls, *_) = cases.vectors(rated=False, hold=hold)
     random = np.random.default_rng(14)
     starts = BODY.state(
-        rate=random.uniform(-1, 1, (6, 3)), attitude=Rotation.random(6, random_state=14).as_matrix()
+        rate=random.uniform(-1, 1, (4, 3)), attitude=Rotation.random(4, random_state=14).as_matrix()
     )
     shares = []
-    for run in fly(BODY, law, starts=starts, duration=5.0):
+    for run in fly(BODY, law, starts=starts, duration=2.0):
         verdict = falls.check(run)
         assert verdict.holds
         om, s = (

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from controllers.gorelov import min_energy, min_fuel, min_peak, min_time, rigid_time
@@ -94,6 +94,33 @@ def test_the_least_time_is_the_first_that_will_do(asked):
         T = share * plan.duration
         assume(T * max(asked["omega"]) > 0.3)
         assert min_peak(**asked | {"duration": T}).peak > peak
+
+
+def rigid_body_can(*, duration, bound, x1, v0, v1, slack=0.0):
+    """Whether |u| <= m0 takes x'' = u there: thrust forward as early as possible goes farthest."""
+    first, impulse = x1 - duration * v0, v1 - v0
+    if abs(impulse) > bound * duration + slack:
+        return False
+    backward = (duration - impulse / bound) / 2
+    reach = bound * (duration**2 / 2 - backward**2) - impulse * duration / 2
+    return abs(first - impulse * duration / 2) <= reach + slack
+
+
+@given(st.floats(-3, 3), RATES, st.floats(0.05, 5))
+@example(0.5, (0.0, 1.0), 1.0)  # one pulse, in two ways
+@example(-0.5, (1.0, 0.0), 1.0)
+@example(1.5, (1.0, 2.0), 1.0)
+@example(0.07, (0.1, 0.3), 4 / 7)  # the same, with rounding
+def test_least_time_of_a_rigid_body(x1, rates, bound):
+    v0, v1 = rates
+    assume(abs(x1) + abs(v1 - v0) > 1e-3)
+    T = rigid_time(bound=bound, x0=0.0, v0=v0, x1=x1, v1=v1)
+    task = {"bound": bound, "x1": x1, "v0": v0, "v1": v1}
+    # Where a pulse has no length the time is known to the root of the rounding error; just after
+    # such a time the bound may not suffice again.
+    assert rigid_body_can(duration=T, **task, slack=1e-6)
+    earlier = np.linspace(0.01, 1, 60) * (T - 1e-6)
+    assert not any(rigid_body_can(duration=float(x), **task) for x in earlier)
 
 
 def test_more_modes_cost_more():

@@ -1,0 +1,198 @@
+"""Commands beside the flight itself: compare, repair, margins, export, video, doctor."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+
+from spacecraft_sim import terminal
+from spacecraft_sim.terminal import HOLDS
+from spacecraft_sim.versions import require_supported_mujoco
+
+if TYPE_CHECKING:
+    from spacecraft_sim.mission import Mission
+
+# -- compare ---------------------------------------------------------------------------------------
+
+
+def compare(arguments: argparse.Namespace) -> int:
+    """Puts two runs in one recording, one figure and one table.
+
+    Args:
+        arguments: Words of the command.
+
+    Returns:
+        The exit code.
+    """
+    require_supported_mujoco()
+    from spacecraft_sim import run_folder, run_pair
+
+    factor = terminal.exaggeration(arguments)
+    compared = run_pair.pair(run_pair.read(arguments.a), run_pair.read(arguments.b))
+    name = f"{arguments.a.resolve().name}-and-{arguments.b.resolve().name}"
+    folder = run_folder.create(arguments.out, name)
+    run_folder.write_pair(folder, compared, factor)
+    table = Table("", "A", "B", "B - A", box=None)
+    for heading, rows in run_pair.table(compared):
+        table.add_row(f"[bold]{heading}[/]")
+        for what, *values in rows or [("none",)]:
+            table.add_row(f"  {escape(what)}", *values)
+    console = terminal.console()
+    console.print(table)
+    console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
+    console.print(f"open the recording:  rerun {folder / 'recording.rrd'}", highlight=False)
+    return HOLDS
+
+
+# -- repair ----------------------------------------------------------------------------------------
+
+
+def repair(arguments: argparse.Namespace) -> int:
+    """Makes a recording whole whose run was killed.
+
+    Args:
+        arguments: Words of the command.
+
+    Returns:
+        The exit code.
+    """
+    from spacecraft_sim import repair
+
+    words = "repaired" if repair.repair(arguments.file) else "whole already"
+    print(f"{arguments.file}: {words}; it reads up to t = {repair.end(arguments.file):.6g} s")
+    return HOLDS
+
+
+# -- margins ---------------------------------------------------------------------------------------
+
+
+def margins(arguments: argparse.Namespace) -> int:
+    """Says what delay, sampling period and torque limits a smooth law bears.
+
+    Args:
+        arguments: Words of the command.
+
+    Returns:
+        The exit code.
+    """
+    mission = terminal.assemble(arguments)
+    from spacecraft_sim import margins, run_folder
+
+    settled = margins.settle(mission)
+    found = margins.margins(settled, flown=not arguments.linear)
+    table = Table("", "linear loop", "MuJoCo", title=mission.scenario.title, box=None)
+    for margin in found:
+        table.add_row(margin.name, *(f"{1e3 * x:.5g} ms" for x in (margin.linear, margin.flown)))
+    saturated = () if arguments.linear else margins.saturation(mission, _flights(arguments))
+    limits = Table("torques up to", "settled after", "distance in the end", box=None)
+    for row in saturated:
+        limits.add_row(f"{row.limit:.5g} N m", f"{row.settling:.5g} s", f"{row.distance:.3g}")
+    console = terminal.console()
+    console.print(table)
+    if saturated:
+        console.print(limits)
+    if arguments.out:
+        folder = run_folder.create(arguments.out, mission.scenario.name)
+        run_folder.write_margins(folder, mission.scenario, found, saturated)
+        console.print(f"{folder / 'margins.json'}")
+    return HOLDS
+
+
+def _flights(arguments: argparse.Namespace) -> "Callable[[float], Mission]":
+    """What assembles the same mission with other limits of its torques, N m."""
+    from spacecraft_sim import mission
+
+    def limited(limit: float) -> "Mission":
+        settings = (*arguments.set, f"thrusters.all.levels=[{limit!r}]")
+        return mission.assemble(mission.load_scenario(arguments.name, settings))
+
+    return limited
+
+
+# -- export ----------------------------------------------------------------------------------------
+
+
+def export(arguments: argparse.Namespace) -> int:
+    """Writes the complete MJCF of a spacecraft as one file.
+
+    Args:
+        arguments: Words of the command.
+
+    Returns:
+        The exit code.
+    """
+    require_supported_mujoco()
+    from spacecraft_sim import config, library, mjcf, spacecraft
+
+    name = arguments.name
+    own = name.endswith(".toml") and "spacecraft" in config.read(Path(name))
+    if own or name in library.scenario_names():
+        from spacecraft_sim import mission
+
+        scenario = mission.load_scenario(name)
+        machine = spacecraft.load(scenario.spacecraft).with_parts(**scenario.changes())
+    else:
+        machine = spacecraft.load(name)
+    if arguments.file.exists():
+        raise ValueError(f"{arguments.file}: exists already; name a file that does not")
+    try:
+        mjcf.export(machine, arguments.file)
+    except OSError as error:
+        raise ValueError(f"{arguments.file}: cannot be written: {error.strerror}") from error
+    terminal.console().print(f"{arguments.file}: {machine.title}")
+    return HOLDS
+
+
+# -- video, doctor ---------------------------------------------------------------------------------
+
+
+def video(arguments: argparse.Namespace) -> int:
+    """Renders the flight in the folder of a run, without a display.
+
+    Args:
+        arguments: Words of the command.
+
+    Returns:
+        The exit code.
+    """
+    from spacecraft_sim import video
+
+    console = Console(stderr=True)
+    columns = TextColumn("rendering"), MofNCompleteColumn(), TextColumn("frames")
+    watched = console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=not watched) as progress:
+        task = progress.add_task("", total=None)
+        written = video.write(
+            arguments.folder,
+            camera=arguments.camera,
+            fps=arguments.fps,
+            speed=arguments.speed,
+            out=arguments.out,
+            progress=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    terminal.console().print(f"{written}: {written.stat().st_size / 1e6:.2f} MB", highlight=False)
+    return HOLDS
+
+
+def doctor(_: argparse.Namespace) -> int:
+    """Says what this machine can do, what is missing, and what to install.
+
+    Args:
+        _: Words of the command.
+
+    Returns:
+        The exit code.
+    """
+    from spacecraft_sim import doctor
+
+    table = Table("", "what", "found", "to do", box=None, pad_edge=False, header_style="bold")
+    marks = {"ok": "[green]ok[/]", "limited": "[yellow]limited[/]", "missing": "[red]missing[/]"}
+    for check in doctor.checks():
+        table.add_row(marks[check.state], check.subject, escape(check.found), escape(check.advice))
+    terminal.console().print(table)
+    return HOLDS
