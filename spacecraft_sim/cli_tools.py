@@ -1,6 +1,7 @@
 """Commands beside the flight itself: compare, repair, margins, export, video, doctor."""
 
 import argparse
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -87,7 +88,7 @@ def margins(arguments: argparse.Namespace) -> int:
     found = margins.margins(settled, flown=not arguments.linear)
     table = Table("", "linear loop", "MuJoCo", title=mission.scenario.title, box=None)
     for margin in found:
-        table.add_row(margin.name, *(f"{1e3 * x:.5g} ms" for x in (margin.linear, margin.flown)))
+        table.add_row(margin.name, *map(_milliseconds, (margin.linear, margin.flown)))
     saturated = () if arguments.linear else margins.saturation(mission, _flights(arguments))
     limits = Table("torques up to", "settled after", "distance in the end", box=None)
     for row in saturated:
@@ -101,6 +102,11 @@ def margins(arguments: argparse.Namespace) -> int:
         run_folder.write_margins(folder, mission.scenario, found, saturated)
         console.print(f"{folder / 'margins.json'}")
     return HOLDS
+
+
+def _milliseconds(time: float) -> str:
+    """Nothing for what was not sought or not found."""
+    return "" if math.isnan(time) else f"{1e3 * time:.5g} ms"
 
 
 def _flights(arguments: argparse.Namespace) -> "Callable[[float], Mission]":
@@ -179,11 +185,11 @@ def video(arguments: argparse.Namespace) -> int:
     return HOLDS
 
 
-def doctor(_: argparse.Namespace) -> int:
+def doctor(arguments: argparse.Namespace) -> int:
     """Says what this machine can do, what is missing, and what to install.
 
     Args:
-        _: Words of the command.
+        arguments: Words of the command; there are none.
 
     Returns:
         The exit code.
