@@ -114,9 +114,9 @@ def test_readings_and_torques_in_principal_axes_are_the_reference_figures():
     y = flown.mujoco.select(flown.controller.sensors)()
     reference = (0.4976, -0.768, 0.4032, -0.0768, 0.424, 0.9024, 0.412, -0.36, 0.284)
     assert y == pytest.approx(reference, abs=1e-12)
-    M = flown.controller.formula.command(0.0, y, ())
+    torques = flown.controller.formula.command(0.0, y, ())
     # r2 and r3 have eight decimals.
-    np.testing.assert_allclose(M, (-1.244095, 1.842912, 0.188183), atol=1e-6)
+    np.testing.assert_allclose(torques, (-1.244095, 1.842912, 0.188183), atol=1e-6)
 
 
 def test_a_law_without_velocity_sensors_would_not_get_one():
