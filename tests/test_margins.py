@@ -43,7 +43,7 @@ def test_linear_margins_of_the_compiled_machine_are_the_reference_figures(name):
     found = margins.margins(settled, flown=False)
     assert [1e3 * m.linear for m in found] == pytest.approx(REFERENCE[name], rel=0.03)
     slowest = max(x.real for x in settled.loop.eigenvalues().tolist())
-    assert slowest == pytest.approx(DECAY[name], abs=2e-3)  # the shortest is printed so
+    assert slowest == pytest.approx(DECAY[name], abs=5e-3)  # the shortest has two decimals
 
 
 @pytest.mark.slow
