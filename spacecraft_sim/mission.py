@@ -38,6 +38,7 @@ from spacecraft_sim.guarantee import Guarantee
 from spacecraft_sim.mechanisms import FlexibleMechanism, Mechanism
 from spacecraft_sim.physics import MujocoPhysics
 from spacecraft_sim.plant import PlantName
+from spacecraft_sim.reduced import ReducedPhysics
 from spacecraft_sim.scenario import Scenario
 from spacecraft_sim.simulate import Environment, simulate
 from spacecraft_sim.spacecraft import Spacecraft
@@ -242,7 +243,7 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
     return mission
 
 
-ReducedPlant = reduced.ReducedPhysics | EquationsPhysics
+ReducedPlant = ReducedPhysics | EquationsPhysics
 
 # What a design asks for by the type of its first argument, read off the compiled machine.
 _MODELS: dict[Any, Callable[[Any], Any]] = {
