@@ -67,7 +67,7 @@ class Mission:
     scenario: Scenario
     machine: Spacecraft
     mujoco: MujocoPhysics
-    reduced: reduced.ReducedPhysics | EquationsPhysics
+    reduced: ReducedPhysics | EquationsPhysics
     design: Design
     controller: Controller
     guarantees: tuple[Guarantee, ...]
@@ -84,7 +84,7 @@ class Mission:
     def errata(self) -> tuple[errata.Section, ...]:
         """Known misprints of the papers that the law, its module or its claims cite."""
         own = self.guarantees
-        if isinstance(self.reduced, reduced.ReducedPhysics):  # balances are true of any law
+        if isinstance(self.reduced, ReducedPhysics):  # balances are true of any law
             balances = conservation.momentum_balances(self.reduced.model)
             own = own[: len(own) - len(balances)]
         about = (self.design, sys.modules[self.design.__module__])
