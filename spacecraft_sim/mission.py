@@ -81,6 +81,12 @@ class Mission:
         return self.scenario.controller.get("accuracy", next(iter(bands), None))
 
     @property
+    def bands(self) -> dict[str, float]:
+        """Half-widths that the charts of the law promise to keep to about zero, by signal, rad."""
+        drawn = portraits(charts_of(self.controller))
+        return {chart.signals[0]: chart.band for chart in drawn if chart.band}
+
+    @property
     def errata(self) -> tuple[errata.Section, ...]:
         """Known misprints of the papers that the law, its module or its claims cite."""
         own = self.guarantees

@@ -1,6 +1,7 @@
 """A flight on one page: film strip, histories, the end of the flight, thrust, verdicts."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from spacecraft_sim import spans
 from spacecraft_sim.drawing import Drawing, channel_units
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.plots_film import BOOMS, INK, MINUS, PLUS, SHADE, SOFT, film
-from spacecraft_sim.trajectory import Trajectory, moving_axes
+from spacecraft_sim.trajectory import Trajectory, between_rows, moving_axes
 
 Array = np.ndarray
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
@@ -25,8 +26,10 @@ WIDTH, DPI, FRAMES = 18.0, 100, 6  # inches, dots an inch, pictures in the film 
 PLANTS = (("reduced", "#f29b38", 3.2), ("MuJoCo", "#1f6fd6", 1.2))  # the thin over the wide line
 GOOD, BAD = "#1f8f4d", "#c62828"
 DASHES = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)))  # of the axis that moves most, and of the others
-COLUMNS = {"claim": 0.035, "predicted": 0.5, "measured": 0.625, "bound": 0.755}
-COLUMNS |= {"unit": 0.80, "margin": 0.91, "worst at": 0.995}
+COLUMNS = {"claim": 0.035, "predicted": 0.515, "measured": 0.63, "bound": 0.75}
+COLUMNS |= {"unit": 0.77, "margin": 0.92, "worst at": 0.995}
+REST = 1e-9  # share of the angle, and rad/s, that count as no motion
+FEW = 3000  # rows of a track that is drawn between them too
 DENSE = 160  # commands in a panel that would hide what they cross
 
 
@@ -38,7 +41,7 @@ def summary(
     drawing: Drawing,
     verdicts: Sequence[Verdict],
     title: str,
-    band: float | None = None,
+    bands: Mapping[str, float] | None = None,
     histories: Sequence[Callable[[Axes, Flights, bool], None]] | None = None,
 ) -> None:
     """Draws what happened on one page of about 1800 x 1200 pixels.
@@ -50,10 +53,10 @@ def summary(
         drawing: Shapes and motion of the full plant.
         verdicts: What became of the guarantees on the full plant.
         title: One line over the page.
-        band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
+        bands: Half-widths that signals are to keep, by signal, rad; none if left out.
         histories: Four panels in place of those of the quasi-rigid motion.
     """
-    channels = channel_units(measured, drawing)
+    channels, bands = channel_units(measured, drawing), bands or {}
     lanes = max(1.0, 0.42 * len(channels))  # inches
     heights = [1.9, 2.3, 2.3, max(0.3 * (len(verdicts) + 1), 2 * lanes + 0.6)]
     edges = np.cumsum([1.12, heights[0], 0.55, heights[1], 0.62, heights[2], 0.72, heights[3]])
@@ -66,7 +69,7 @@ def summary(
     strip = [figure.add_subplot(cell) for cell in _grid(figure, rows[0], FRAMES, 0.012, 0.03)]
     note = film(strip, drawing, measured)
     figure.text(0.012, 1 - 0.72 / height, note, size=9.5, color=SOFT, va="center")
-    _key(figure, 1 - 0.72 / height, moving_axes(measured, "attitude"), band)
+    _key(figure, 1 - 0.72 / height, moving_axes(measured, "attitude"), bands)
     for row, zoom in ((rows[1], False), (rows[2], True)):
         start = late if zoom else measured.time[0]
         flights = _since(predicted, start), _since(measured, start)
@@ -74,11 +77,11 @@ def summary(
         if histories:
             for draw, axes in zip(histories, panels, strict=True):
                 draw(axes, flights, zoom)
-            continue
-        _angle(panels[0], flights, band or 0.0, zoom)
-        _attitude(panels[1], flights, band or 0.0, zoom)
-        _tips(panels[2], flights, tuple(drawing.booms))
-        _phase_plane(panels[3], flights, band or 0.0, zoom)
+        else:
+            _angle(panels[0], flights, "quasi_rigid_angle", bands, zoom)
+            _angle(panels[1], flights, "attitude", bands, zoom)
+            _tips(panels[2], flights, tuple(drawing.booms))
+            _phase_plane(panels[3], flights, bands, zoom)
         words = "END OF THE FLIGHT" if zoom else "WHOLE FLIGHT"
         style = {"size": 9, "color": SOFT, "weight": "bold", "rotation": 90, "va": "center"}
         figure.text(0.016, row.mean(), words, ha="center", **style)
@@ -89,7 +92,7 @@ def summary(
     for k, span in enumerate(((0.0, settled), (late, end))):
         dense = _thrust(axes := figure.add_subplot(grid[k]), measured, channels, span)
         unit = " or ".join(sorted(set(channels.values()))) or "N"
-        line = "commands too dense to draw" if dense else "line: commanded"
+        line = "commands too dense" if dense else "line: commanded"
         words = f"Thrust, {unit}, log levels; filled: delivered; {line}"
         panel(axes, f"The same at the end{'; ' + line if dense else ''}" if k else words)
     figure.savefig(path, pil_kwargs={"compress_level": 3})
@@ -109,17 +112,18 @@ def _heading(figure: Figure, title: str, verdicts: Sequence[Verdict], y: float) 
     figure.text(0.988, y, f"{kept} of {len(verdicts)} claims hold", **style)
 
 
-def _key(figure: Figure, y: float, axes: Sequence[str], band: float | None) -> None:
+def _key(figure: Figure, y: float, axes: Sequence[str], bands: Mapping[str, float]) -> None:
     """One key for the page, so that none covers a curve."""
     entries = [(name, color, width, "-") for name, color, width in PLANTS]
     if len(axes) > 1:
         entries += [(a, INK, 1.4, dashes) for a, dashes in zip(axes, DASHES, strict=False)]
-    if band:
-        entries.append((f"±{band:g} rad asked", GOOD, 1.4, "-"))
+    if bands:
+        asked = ", ".join(f"{signal[-1]} ±{half:.3g} rad" for signal, half in bands.items())
+        entries.append((f"asked: {asked}", GOOD, 1.4, "-"))
     x = 0.988
     for name, color, width, dashes in reversed(entries):
-        figure.text(x, y, name, size=9.5, color=INK, ha="right", va="center")
-        x -= 0.0041 * len(name) + 0.005
+        text = figure.text(x, y, name, size=9.5, color=INK, ha="right", va="center")
+        x = text.get_window_extent().x0 / figure.bbox.width - 0.005
         look = {"color": color, "linewidth": width, "linestyle": dashes}
         figure.add_artist(Line2D([x - 0.018, x], [y, y], transform=figure.transFigure, **look))
         x -= 0.03
@@ -151,29 +155,30 @@ def panel(axes: Axes, title: str, x: str = "", y: str = "", below: bool = False)
         axes.legend(fontsize=8.5, frameon=False, ncols=columns, borderpad=0.2, **place)
 
 
-def _angle(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
-    peak, scale, unit = _histories(axes, flights, "quasi_rigid_angle", band)
-    if band:
-        limit = band / scale
-        axes.axhspan(-limit, limit, color=GOOD, alpha=0.10, linewidth=0)
-        axes.hlines([-limit, limit], *axes.get_xlim(), color=GOOD, linewidth=1.4)
-        if zoom and 0 < peak < 0.4 * limit:
-            # Linear up to the peak, logarithmic to the limit: cycle and bound on one axis.
-            axes.set_yscale("symlog", linthresh=1.2 * peak, linscale=1.0)
-            axes.set_yticks(ticks := [-limit, -peak, 0, peak, limit], [f"{t:.3g}" for t in ticks])
-            axes.set_yticks([], minor=True)
-            axes.set_ylim(-1.5 * limit, 1.5 * limit)
-            unit += " (log beyond the peak)"
-    panel(axes, f"Quasi-rigid angle, {unit}")
-
-
-def _attitude(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
-    peak, scale, unit = _histories(axes, flights, "attitude")
-    if zoom and band:
-        for limit in (-band / scale, band / scale):
-            axes.axhline(limit, color=GOOD, linewidth=1, linestyle=":")
-        axes.set_ylim(-1.1 * (top := max(peak, band / scale)), 1.1 * top)
-    panel(axes, f"Attitude of the bus, {unit}")
+def _angle(axes: Axes, flights: Flights, kind: str, bands: Mapping[str, float], zoom: bool) -> None:
+    """An angle with its own bands filled and those of the other angle dotted."""
+    own = {name: half for name, half in bands.items() if name[:-2] == kind}
+    others = [half for name, half in bands.items() if name not in own]
+    peak, scale, unit = _histories(axes, flights, kind, max(own.values(), default=0.0))
+    for name, half in own.items():
+        dashes = DASHES[moving_axes(flights[1], kind).index(name[-1]) % 3] if len(own) > 1 else "-"
+        axes.axhspan(-half / scale, half / scale, color=GOOD, alpha=0.10, linewidth=0)
+        for limit in (-half / scale, half / scale):
+            axes.axhline(limit, color=GOOD, linewidth=1.4, linestyle=dashes)
+    if zoom:
+        for half in others:
+            for limit in (-half / scale, half / scale):
+                axes.axhline(limit, color=GOOD, linewidth=1, linestyle=":")
+    limit = max(own.values(), default=0.0) / scale
+    if zoom and len(own) == 1 and 0 < peak < 0.4 * limit:
+        # Linear up to the peak, logarithmic to the limit: cycle and bound on one axis.
+        axes.set_yscale("symlog", linthresh=1.2 * peak, linscale=1.0)
+        axes.set_yticks(ticks := [-limit, -peak, 0, peak, limit], [f"{t:.3g}" for t in ticks])
+        axes.set_yticks([], minor=True)
+        axes.set_ylim(-1.5 * limit, 1.5 * limit)
+        unit += " (log beyond the peak)"
+    words = {"quasi_rigid_angle": "Quasi-rigid angle", "attitude": "Attitude of the bus"}
+    panel(axes, f"{words[kind]}, {unit}")
 
 
 def _histories(
@@ -181,15 +186,30 @@ def _histories(
 ) -> tuple[float, float, str]:
     """Draws the moving axes; returns their peak and a unit that suits it and `also`, with name."""
     moving = moving_axes(flights[1], kind)
-    peak = max((_peak(flights[1][f"{kind}_{axis}"]) for axis in moving), default=0.0)
-    scale, letter = prefix(max(peak, also))
-    for axis, dashes in zip(moving, DASHES, strict=False):
-        for flight, (_, color, width) in zip(flights, PLANTS, strict=True):
-            if (value := flight.signals.get(f"{kind}_{axis}")) is not None:
-                look = {"color": color, "linewidth": width, "linestyle": dashes}
-                axes.plot(flight.time, value / scale, **look)
+    drawn = [
+        (flight.time, flight[name], color, width, dashes)
+        for name, dashes in zip((f"{kind}_{axis}" for axis in moving), DASHES, strict=False)
+        for flight, (_, color, width) in zip(flights, PLANTS, strict=True)
+        if name in flight.signals
+    ]
+    peak = max((_peak(value) for _, value, *_ in drawn), default=0.0)
+    base = 0.0 if also else _base([value for _, value, *_ in drawn])
+    scale, letter = prefix(max([also, *(_peak(value - base) for _, value, *_ in drawn)]))
+    for time, value, color, width, dashes in drawn:
+        look = {"color": color, "linewidth": width, "linestyle": dashes}
+        axes.plot(time, (value - base) / scale, **look)
     _time_axis(axes, flights[1].time[0], flights[1].time[-1])
-    return peak / scale, scale, f"{letter}rad"
+    return peak / scale, scale, f"{letter}rad{f' from {base:.6g} rad' if base else ''}"
+
+
+def _base(values: Sequence[Array]) -> float:
+    """A round number to measure from, where values differ little beside where they lie; or zero."""
+    low = min((float(value.min()) for value in values), default=0.0)
+    high = max((float(value.max()) for value in values), default=0.0)
+    size, span = max(abs(low), abs(high)), high - low
+    if span > 2e-3 * size or size == 0:
+        return 0.0
+    return round((low + high) / 2, -math.floor(math.log10(max(span, 1e-6 * size))) - 1)
 
 
 def _time_axis(axes: Axes, start: float, end: float) -> None:
@@ -222,19 +242,27 @@ def _tips(axes: Axes, flights: Flights, booms: Sequence[str]) -> None:
     return panel(axes, f"Boom tips, deflection, {letter}m")
 
 
-def _phase_plane(axes: Axes, flights: Flights, band: float, zoom: bool) -> None:
+def _phase_plane(axes: Axes, flights: Flights, bands: Mapping[str, float], zoom: bool) -> None:
     axis = next(iter(moving_axes(flights[1], "quasi_rigid_angle")), "")
     x, y = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
     if not all(signal in flights[1].signals for signal in (x, y)):
         return panel(axes, "Phase plane: not recorded")
-    (sx, px), (sy, py) = prefix(_peak(flights[1][x])), prefix(_peak(flights[1][y]))
+    angle, rate = flights[1][x], flights[1][y]
+    if np.ptp(angle) <= REST * _peak(angle) and np.ptp(rate) <= REST:
+        axes.plot(0, 0, "o", color=INK, markersize=4)
+        axes.set(xticks=[], yticks=[])
+        return panel(axes, f"Phase plane {axis}: at rest at {angle[-1]:.4g} rad")
+    (sx, px), (sy, py) = prefix(_peak(angle)), prefix(_peak(rate))
     for flight, (_, color, width) in zip(flights, PLANTS, strict=True):
         if x in flight.signals and y in flight.signals:
-            axes.plot(flight[x] / sx, flight[y] / sy, color=color, linewidth=width)
+            track = np.stack([flight[x], flight[y]], axis=1)
+            if len(track) < FEW:  # the rows alone would be corners
+                track = between_rows(flight.time, flight[x], flight[y]).reshape(-1, 2)
+            axes.plot(*(track / (sx, sy)).T, color=color, linewidth=width)
     if not zoom:
-        x0, y0 = flights[1][x][0] / sx, flights[1][y][0] / sy
-        axes.plot(x0, y0, "o", color=INK, markersize=4)
-        axes.axvspan(-band / sx, band / sx, color=GOOD, alpha=0.15, linewidth=0)
+        axes.plot(angle[0] / sx, rate[0] / sy, "o", color=INK, markersize=4)
+        if half := bands.get(x, 0.0):
+            axes.axvspan(-half / sx, half / sx, color=GOOD, alpha=0.15, linewidth=0)
     return panel(axes, f"Phase plane {axis}: {py}rad/s over {px}rad")
 
 
@@ -309,7 +337,7 @@ def _table(axes: Axes, verdicts: Sequence[Verdict]) -> None:
 def _cell(v: Verdict, head: str) -> str:
     if head == "claim":
         claim = f"not guaranteed: {v.claim}" if v.failed else v.claim
-        return claim if len(claim) <= 50 else f"{claim[:49]}…"
+        return claim if len(claim) <= 62 else f"{claim[:61]}…"
     if head == "predicted":
         return "" if v.predicted is None else f"{v.predicted:.4g}"
     if head == "worst at":

@@ -23,7 +23,7 @@ from spacecraft_sim.chart import (
     worst_to_come,
 )
 from spacecraft_sim.plots import BAD, DPI, GOOD, INK, MINUS, PLUS, SOFT, panel, prefix
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, between_rows
 
 Array = np.ndarray
 
@@ -73,7 +73,7 @@ def _portrait(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
     (sx, px), (sy, py) = _scales(portrait, x, y)
     _regions(axes, portrait.regions, (sx, sy))
     _lines(axes, portrait.lines, (sx, sy))
-    pieces = _smooth(measured.time, x, y) / (sx, sy)
+    pieces = between_rows(measured.time, x, y) / (sx, sy)
     look = {"color": FLIGHT, "linewidth": 1.0, "label": "flight", "zorder": 4}
     axes.add_collection(LineCollection(list(pieces), **look))
     if portrait.min_on_time:
@@ -88,19 +88,6 @@ def _portrait(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
         for name, letter in zip(portrait.signals, (px, py), strict=True)
     ]
     panel(axes, portrait.title, labels[0], labels[1], below=True)
-
-
-def _smooth(time: Array, x: Array, v: Array) -> Array:
-    """The path of x and its rate v between the rows, shape (rows - 1, 9, 2): v linear, x cubic."""
-    s = np.linspace(0, 1, 9)
-    span, (x0, x1), (v0, v1) = np.diff(time)[:, None], _ends(x), _ends(v)
-    cubic = (1 + 2 * s) * (1 - s) ** 2 * x0 + s**2 * (3 - 2 * s) * x1
-    cubic += span * (s * (1 - s) ** 2 * v0 - s**2 * (1 - s) * v1)
-    return np.stack([cubic, v0 + s * (v1 - v0)], axis=2)
-
-
-def _ends(values: Array) -> tuple[Array, Array]:
-    return values[:-1, None], values[1:, None]
 
 
 def _regions(axes: Axes, regions: Sequence[Region], scales: tuple[float, float]) -> None:

@@ -52,6 +52,16 @@
     return [10 ** power, `1e${power} ${unit}`];
   }
 
+  // Scale, unit and offset of an axis; the offset where the span is small beside where it lies.
+  function fitted(unit, low, high) {
+    const size = Math.max(Math.abs(low), Math.abs(high)), span = high - low;
+    if (span > 2e-3 * size) { const [scale, name] = prefix(unit, size); return [scale, name, 0]; }
+    const place = 10 ** Math.floor(Math.log10(span) + 1);
+    const base = Math.round((low + high) / 2 / place) * place;
+    const [scale, name] = prefix(unit, span);
+    return [scale, `${name} from ${short(base, 9)} ${unit}`, base];
+  }
+
   const short = (v, digits = 4) =>
     Number.isFinite(v) ? String(Number(v.toPrecision(digits))).replace("-", "−") : "–";
   function amount(v, unit) {
@@ -115,15 +125,25 @@
     return out.join("");
   }
 
-  function trackPath(x, y, X, Y, [from, to]) {
+  // With times t, y is the rate of x: linear between the rows, and x cubic.
+  function trackPath(x, y, X, Y, [from, to], t) {
     const out = [];
     let pen = "M", px = NaN, py = NaN;
-    for (let k = from; k < to; k++) {
-      const u = X(x[k]), w = Y(y[k]);
-      if (u !== u || w !== w) { pen = "M"; continue; }
-      if (pen === "L" && Math.abs(u - px) < 0.35 && Math.abs(w - py) < 0.35) continue;
+    const put = (a, b) => {
+      const u = X(a), w = Y(b);
+      if (u !== u || w !== w) { pen = "M"; return; }
+      if (pen === "L" && Math.abs(u - px) < 0.35 && Math.abs(w - py) < 0.35) return;
       out.push(pen + at(u, w));
       pen = "L"; px = u; py = w;
+    };
+    const pieces = t && to - from < 1500 ? 8 : 1;
+    for (let k = from; k < to; k++) {
+      for (let n = 1; n < pieces && k > from; n++) {
+        const s = n / pieces, r = 1 - s, h = t[k] - t[k - 1];
+        put((1 + 2 * s) * r * r * x[k - 1] + s * s * (3 - 2 * s) * x[k]
+          + h * (s * r * r * y[k - 1] - s * s * r * y[k]), r * y[k - 1] + s * y[k]);
+      }
+      put(x[k], y[k]);
     }
     return out.join("");
   }
@@ -179,15 +199,17 @@
 
   function axes(back, inner, [x0, x1], [y0, y1], X, Y, labels) {
     const right = inner.x + inner.width, bottom = inner.y + inner.height;
-    const [sx, sy] = [labels.sx ?? 1, labels.sy ?? 1];
+    const [sx, sy, bx, by] = [labels.sx ?? 1, labels.sy ?? 1, labels.bx ?? 0, labels.by ?? 0];
     const lines = { grid: "", zero: "" }, words = [];
-    for (const [v, text] of ticks(x0 / sx, x1 / sx, inner.width / 90)) {
-      lines[v === 0 && labels.plane ? "zero" : "grid"] += `M${at(X(v * sx), T)}V${bottom}`;
-      words.push([X(v * sx), bottom + 14, "middle", labels.plane ? text : `${text} s`]);
+    for (const [v, text] of ticks((x0 - bx) / sx, (x1 - bx) / sx, inner.width / 90)) {
+      const x = X(v * sx + bx);
+      lines[v === 0 && !bx && labels.plane ? "zero" : "grid"] += `M${at(x, T)}V${bottom}`;
+      words.push([x, bottom + 14, "middle", labels.plane ? text : `${text} s`]);
     }
-    for (const [v, text] of labels.yticks ?? ticks(y0 / sy, y1 / sy, inner.height / 30)) {
-      lines[v === 0 ? "zero" : "grid"] += `M${at(L, Y(v * sy))}H${right}`;
-      words.push([L - 6, Y(v * sy) + 4, "end", text]);
+    for (const [v, text] of labels.yticks ?? ticks((y0 - by) / sy, (y1 - by) / sy, inner.height / 30)) {
+      const y = Y(v * sy + by);
+      lines[v === 0 && !by ? "zero" : "grid"] += `M${at(L, y)}H${right}`;
+      words.push([L - 6, y + 4, "end", text]);
     }
     back.replaceChildren();
     for (const name of ["grid", "zero"]) element("path", { class: name, d: lines[name] }, back);
@@ -290,7 +312,7 @@
 
   // The other parts of the page register kinds of figures here.
   window.report = {
-    page, view, column, rows, rowAt, held, prefix, short, amount, ticks, linePath, stepPath, trackPath,
+    page, view, column, rows, rowAt, held, fitted, short, amount, ticks, linePath, stepPath, trackPath,
     loop, element, frame, key, axes, interact, alongTime, setView, setCursor, figures,
     margins: { L, R, T }, cursor: () => cursor, kinds: {},
   };

@@ -46,7 +46,7 @@ def write(
         (predicted, measured),
         drawing,
         verdicts=comparison.verdicts,
-        band=mission.accuracy,
+        bands=mission.bands,
         charts=charts_of(mission.controller),
     )
     sections = {

@@ -6,7 +6,7 @@ kept. Thrust is never thinned: rows at which nothing changes say nothing.
 
 import base64
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -64,7 +64,7 @@ def page(
     drawing: Drawing,
     *,
     verdicts: Sequence[Verdict],
-    band: float | None,
+    bands: Mapping[str, float],
     charts: Charts,
 ) -> Figure:
     """Returns the figures of a flight with their columns.
@@ -73,11 +73,11 @@ def page(
         flights: Of the reduced model and of the full plant.
         drawing: Shapes and motion of the full plant.
         verdicts: What became of the guarantees on the full plant.
-        band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
+        bands: Half-widths that are promised, by signal, rad.
         charts: What the law draws beside its theorem.
     """
     columns, measured = Columns(), flights[1]
-    figures = [_history(columns, kind, flights, drawing, band or 0.0) for kind in HISTORIES]
+    figures = [_history(columns, kind, flights, drawing, bands) for kind in HISTORIES]
     figures = [figure for figure in figures if figure["traces"]]
     if figures:
         figures[0]["marks"] = [
@@ -90,7 +90,7 @@ def page(
     figures.append(_craft(columns, drawing))
     moving = moving_axes(measured, "quasi_rigid_rate")
     axes = [a for a in moving_axes(measured, "quasi_rigid_angle") if a in moving]
-    figures += [f for axis in axes for f in _phase_plane(columns, axis, flights, band or 0.0)]
+    figures += [f for axis in axes for f in _phase_plane(columns, axis, flights, bands)]
     for chart in charts:
         portrait = isinstance(chart, Portrait)
         figures += _portrait(columns, chart, measured) if portrait else [_map(chart)]
@@ -140,7 +140,11 @@ def _steps(columns: Columns, time: Array, values: Array) -> dict[str, str]:
 
 
 def _history(
-    columns: Columns, kind: str, flights: Flights, drawing: Drawing, band: float
+    columns: Columns,
+    kind: str,
+    flights: Flights,
+    drawing: Drawing,
+    bands: Mapping[str, float],
 ) -> Figure:
     traces, unit = [], ""
     for k, (name, signal) in enumerate(_signals(kind, flights[1], drawing).items()):
@@ -154,14 +158,22 @@ def _history(
             trace = {"name": f"{name}, {plant}", "tone": tone, "width": width, "draw": "line"}
             traces.append({**trace, **_curve(columns, flight.time, flight[signal])})
     unit = "N m" if kind == "disturbance" else unit
-    bands = []
-    if band and kind in ("quasi_rigid_angle", "attitude"):
-        asked = {"low": -band, "high": band, "name": f"±{band:g} rad"}
-        # What is asked of the quasi-rigid angle is no bound of the attitude: no filled band.
-        faint = {"faint": True, "name": "asked of the quasi-rigid angle"}
-        bands = [asked if kind == "quasi_rigid_angle" else {**asked, **faint}]
     figure = {"id": kind, "kind": "history", "title": HISTORIES[kind], "unit": unit}
-    return {**figure, "traces": traces, "bands": bands}
+    return {**figure, "traces": traces, "bands": _bands(kind, bands)}
+
+
+def _bands(kind: str, bands: Mapping[str, float]) -> list[Figure]:
+    """Those of a kind of angle filled; those of the other kind faint: they promise nothing here."""
+    found, angles = [], {"quasi_rigid_angle": "quasi-rigid angle", "attitude": "attitude"}
+    for signal, half in bands.items() if kind in angles else ():
+        asked, _, axis = signal.rpartition("_")
+        if asked in angles:
+            other = {} if asked == kind else {"faint": True}
+            name = (
+                f"{axis}: ±{half:.3g} rad" if not other else f"asked of the {angles[asked]} {axis}"
+            )
+            found.append({"low": -half, "high": half, "name": name, **other})
+    return found
 
 
 def _signals(kind: str, measured: Trajectory, drawing: Drawing) -> dict[str, str]:
@@ -237,7 +249,9 @@ def _track(columns: Columns, time: Array, x: Array, y: Array) -> dict[str, str]:
     return {"t": columns.add(time[rows], "f8"), **pair}
 
 
-def _phase_plane(columns: Columns, axis: str, flights: Flights, band: float) -> list[Figure]:
+def _phase_plane(
+    columns: Columns, axis: str, flights: Flights, bands: Mapping[str, float]
+) -> list[Figure]:
     names = [f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"]
     if not all(name in flight.signals for flight in flights for name in names):
         return []
@@ -248,10 +262,11 @@ def _phase_plane(columns: Columns, axis: str, flights: Flights, band: float) -> 
         tracks.append({**look, **track, "dotted": plant == "MuJoCo"})
     x = {"name": f"quasi-rigid angle {axis}", "unit": "rad"}
     y = {"name": f"quasi-rigid rate {axis}", "unit": "rad/s"}
-    bands = [{"low": -band, "high": band, "name": f"±{band:g} rad"}] if band else []
+    half = bands.get(names[0])
+    band = [{"low": -half, "high": half, "name": f"±{half:.3g} rad"}] if half else []
     title = f"Phase plane {axis}" if axis != "z" else "Phase plane"
     figure = _plane(f"phase_{axis}", f"{title}, of the time shown", x, y)
-    return [{**figure, "tracks": tracks, "bands": bands}]
+    return [{**figure, "tracks": tracks, "bands": band, "smooth": len(flights[1].time) <= LIMIT}]
 
 
 def _plane(name: str, title: str, x: Figure, y: Figure) -> Figure:
@@ -300,7 +315,8 @@ def _portrait(columns: Columns, portrait: Portrait, measured: Trajectory) -> lis
     half = [half_width(portrait, k) for k in (0, 1)]
     window = [-half[0], half[0], -half[1], half[1]] if all(half) else None
     plane = _plane(f"chart_{portrait.name}", portrait.title, *labels)
-    plane |= {"tracks": tracks, "window": window, **_outlines(portrait)}
+    smooth = len(time) <= LIMIT
+    plane |= {"tracks": tracks, "window": window, "smooth": smooth, **_outlines(portrait)}
     band = portrait.band
     still = {"name": "largest still to come", "tone": "bad", "width": 1.3, "draw": "line"}
     inside = {

@@ -1,7 +1,7 @@
 // The kinds of figures of report.html: histories, thrust lanes, planes, the spacecraft itself.
 "use strict";
 (() => {
-  const { page, view, column, rows, held, prefix, short, amount, linePath, stepPath, trackPath, loop,
+  const { page, view, column, rows, held, fitted, short, amount, linePath, stepPath, trackPath, loop,
     element, frame, key, axes, interact, alongTime, setView, setCursor, margins, cursor,
   } = window.report;
   const { L, T } = margins;
@@ -73,8 +73,8 @@
       [X, inverse] = timeAxis(inner);
       const [y0, y1] = reach();
       const Y = (v) => T + inner.height * (1 - (v - y0) / (y1 - y0));
-      const [sy, unit] = prefix(spec.unit, Math.max(Math.abs(y0), Math.abs(y1)));
-      axes(shape.back, inner, [view.from, view.to], [y0, y1], X, Y, { y: unit, sy });
+      const [sy, unit, by] = fitted(spec.unit, y0, y1);
+      axes(shape.back, inner, [view.from, view.to], [y0, y1], X, Y, { y: unit, sy, by });
       for (const { low, high, faint } of spec.bands) {
         const [a, b] = [Y(high), Y(low)].map((y) => Math.min(Math.max(y, T - 2), T + inner.height + 2));
         const place = { x: L, y: a, width: inner.width, height: Math.max(b - a, 1) };
@@ -225,11 +225,10 @@
       Y = (v) => T + inner.height * (1 - (v - y0) / (y1 - y0));
       back = [(x) => x0 + (x - L) / inner.width * (x1 - x0),
         (y) => y0 + (1 - (y - T) / inner.height) * (y1 - y0)];
-      const [sx, ux] = prefix(spec.x.unit, Math.max(Math.abs(x0), Math.abs(x1)));
-      const [sy, uy] = prefix(spec.y.unit, Math.max(Math.abs(y0), Math.abs(y1)));
+      const [[sx, ux, bx], [sy, uy, by]] = [fitted(spec.x.unit, x0, x1), fitted(spec.y.unit, y0, y1)];
       const label = (axis, unit) => (unit ? `${axis.name}, ${unit}` : axis.name);
       axes(shape.back, inner, [x0, x1], [y0, y1], X, Y,
-        { x: label(spec.x, ux), y: label(spec.y, uy), sx, sy, plane: true });
+        { x: label(spec.x, ux), y: label(spec.y, uy), sx, sy, bx, by, plane: true });
       for (const { low, high } of spec.bands) {
         const [a, b] = [X(low), X(high)].map((x) => Math.min(Math.max(x, L), L + inner.width));
         element("rect", { class: "band", x: a, y: T, width: b - a, height: inner.height }, shape.back);
@@ -240,7 +239,7 @@
       shape.front.replaceChildren();
       for (const { t, x, y, path, found, tone, dotted } of tracks) {
         const off = found?.classList.contains("off");
-        path.setAttribute("d", off ? "" : trackPath(x, y, X, Y, rows(t, view.from, view.to)));
+        path.setAttribute("d", off ? "" : trackPath(x, y, X, Y, rows(t, view.from, view.to), spec.smooth && t));
         const now = cursor();
         const k = now === null ? 0 : held(t, now);
         if (off || !dotted || (now === null && view.from > page.start) || x[k] !== x[k]) continue;

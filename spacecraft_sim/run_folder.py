@@ -157,7 +157,7 @@ def write_pictures(
         drawing=drawn,
         verdicts=comparison.verdicts,
         title=title,
-        band=mission.accuracy,
+        bands=mission.bands,
         histories=None if rigid else plots_smooth.panels(measured),
     )
     if any(not isinstance(chart, Portrait) for chart in charts):

@@ -161,6 +161,25 @@ def peak(time: Array, value: Array, rate: Array) -> tuple[float, float]:
     return float(values[worst]), float(times[worst])
 
 
+def between_rows(time: Array, value: Array, rate: Array, pieces: int = 8) -> Array:
+    """Returns a signal and its rate between the rows: the rate linear, the signal cubic.
+
+    Args:
+        time: Times of the rows, shape (n,), s.
+        value: The signal, shape (n,).
+        rate: Its time derivative, shape (n,).
+        pieces: Into how many pieces each interval is divided.
+
+    Returns:
+        Signal and rate at both ends of every piece, shape (n - 1, pieces + 1, 2).
+    """
+    s = np.linspace(0, 1, pieces + 1)
+    x0, x1, v0, v1 = value[:-1, None], value[1:, None], rate[:-1, None], rate[1:, None]
+    cubic = (1 + 2 * s) * (1 - s) ** 2 * x0 + s**2 * (3 - 2 * s) * x1
+    cubic += np.diff(time)[:, None] * (s * (1 - s) ** 2 * v0 - s**2 * (1 - s) * v1)
+    return np.stack([cubic, v0 + s * (v1 - v0)], axis=2)
+
+
 def moving_axes(trajectory: Trajectory, kind: str) -> list[str]:
     """Returns the axes of a vector signal that move at all, the most moving first.
 

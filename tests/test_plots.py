@@ -46,7 +46,7 @@ def page(tmp_path_factory):
                     drawing=flight.drawing,
                     verdicts=flight.comparison.verdicts,
                     title="A flight",
-                    band=flight.mission.accuracy,
+                    bands=flight.mission.bands,
                 )
             drawn[id(flight)] = flight, kept[0], imread(path)  # the flight too: ids are used again
         return drawn[id(flight)][1:]
@@ -101,6 +101,23 @@ def test_surfaces_reach_as_far_as_the_shapes(kind, size, reach):
     moved = sketch.surface(shape(kind, size, (5, 0, 0), turn)) - [5, 0, 0]
     x, y, z = reach
     np.testing.assert_allclose(np.abs(moved).max(axis=0), (x, z, y), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "base"),
+    [
+        ([0.7, 0.70005], 0.7),
+        ([0.70012, 0.70005], 0.7001),
+        ([0.7, 0.71], 0.0),  # it can be read as it is
+        ([-1e-6, 1e-6], 0.0),
+        ([0.0], 0.0),
+        ([], 0.0),
+        ([-0.7], -0.7),
+    ],
+)
+def test_what_differs_little_is_measured_from_a_round_number(values, base):
+    found = plots._base([np.array([value]) for value in values])
+    assert found == pytest.approx(base, abs=1e-12)
 
 
 @given(st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=1, max_size=30))
@@ -176,7 +193,7 @@ def test_the_page_of_a_planar_flight(page):
     assert pixels.shape[1] == 1800
     assert 1000 < pixels.shape[0] < 1500
     assert any(text.startswith("Seen from +z; bending drawn × ") for text in words(figure))
-    assert "±0.007 rad asked" in words(figure)
+    assert "asked: z ±0.007 rad" in words(figure)
     assert sum("Boom tips" in title for title in titles(figure)) == 2
     assert {"WHOLE FLIGHT", "END OF THE FLIGHT"} <= set(words(figure))
 
@@ -240,7 +257,32 @@ def test_commands_too_dense_to_draw_are_said_to_be(page):
     fast = np.where(np.arange(len(time)) % 2, 1.0, -1.0)
     signals = {**flight.measured.signals, "thruster_z_command": fast, "thruster_z": fast}
     figure, _ = page(replace(flight, measured=replace(flight.measured, signals=signals)))
-    assert any("commands too dense to draw" in title for title in titles(figure))
+    assert any("commands too dense" in title for title in titles(figure))
+
+
+def test_a_craft_that_is_at_rest_is_said_to_be(page):
+    flight = flown(*PLANAR)
+    names = ("quasi_rigid_angle_z", "quasi_rigid_rate_z")
+    still = dict(
+        zip(names, (np.full_like(flight.measured.time, v) for v in (0.7, 0.0)), strict=True)
+    )
+    signals = {**flight.measured.signals, **still}
+    figure, _ = page(replace(flight, measured=replace(flight.measured, signals=signals)))
+    assert titles(figure).count("Phase plane z: at rest at 0.7 rad") == 2
+
+
+def test_bands_of_two_axes_have_the_dashes_of_the_axes(tmp_path):
+    flight = flown(*TUMBLING)
+    figure = Figure()
+    bands = {"attitude_x": 0.02, "attitude_y": 0.01, "quasi_rigid_angle_x": 0.03}
+    pair = flight.predicted, flight.measured
+    plots._angle(own := figure.add_subplot(), pair, "attitude", bands, zoom=True)
+    heights = [abs(line.get_ydata()[0]) for line in own.lines if len(set(line.get_ydata())) == 1]
+    scale = 1e-3  # attitudes of 0.1 to 0.2 rad are drawn in mrad
+    assert sorted(heights[-6:]) == pytest.approx(
+        [h / scale for h in (0.01, 0.01, 0.02, 0.02, 0.03, 0.03)]
+    )
+    assert len(own.patches) == 2  # filled: the band of the other angle is none of this one
 
 
 def test_charts_of_a_law_have_their_key_under_the_portrait(tmp_path):

@@ -43,7 +43,7 @@ def figures(flight, limit=None, monkeypatch=None):
         (flight.predicted, flight.measured),
         flight.drawing,
         verdicts=flight.comparison.verdicts,
-        band=flight.mission.accuracy,
+        bands=flight.mission.bands,
         charts=charts_of(flight.mission.controller),
     )
     page = json.loads(json.dumps(page, allow_nan=False))
@@ -122,6 +122,14 @@ def test_bands_marks_and_spans_are_those_of_the_run():
     assert (strip["low"], strip["high"]) == (-0.007, 0.007)
     worst = {v.t_worst for v in flight.comparison.verdicts if v.t_worst is not None}
     assert {mark["t"] for mark in found["quasi_rigid_angle"]["marks"]} == worst
+
+
+def test_each_axis_has_its_own_band_and_none_where_nothing_is_promised():
+    found = report_figures._bands("attitude", {"attitude_x": 1e-3, "quasi_rigid_angle_z": 2e-3})
+    assert [(b["high"], b.get("faint", False)) for b in found] == [(1e-3, False), (2e-3, True)]
+    assert found[0]["name"] == "x: ±0.001 rad"
+    assert found[1]["name"] == "asked of the quasi-rigid angle z"
+    assert report_figures._bands("rate", {"attitude_x": 1e-3}) == []
 
 
 def test_a_long_flight_is_thinned_and_the_page_says_so(tmp_path, monkeypatch):

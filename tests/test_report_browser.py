@@ -1,6 +1,7 @@
 """report.html in a browser without a window: it loads, draws every figure, zooms, reads out."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -147,6 +148,32 @@ def test_hovering_reads_out_what_was_recorded(page):
     # The same instant everywhere: the dot on the phase plane stands where the flight was.
     assert page.evaluate("document.querySelectorAll('[data-figure=phase_z] .dot').length") == 1
     assert f"t = {t:.3f} s" in page.evaluate("document.querySelector('.now').textContent")
+
+
+PHASE = "document.querySelectorAll('[data-figure=phase_z] .trace')[1].getAttribute('d')"
+
+
+def test_the_phase_plane_follows_the_time_shown_and_curves_between_the_rows(page):
+    whole = page.evaluate(PHASE)
+    page.evaluate("report.setView(30, 31)")
+    page.settle()
+    time = flown(*SETTINGS).measured.time
+    rows = np.count_nonzero((time >= 30) & (time <= 31))
+    points = page.evaluate(f"{PHASE}.split(/[ML]/).length - 1")
+    assert page.evaluate(PHASE) != whole
+    assert points > 4 * rows  # eight pieces an interval, those of no length left out
+
+
+def test_an_axis_that_spans_little_says_where_it_begins(page):
+    label = """[...document.querySelectorAll('[data-figure=attitude] svg text')]
+        .map(t => t.textContent).find(t => t.includes('rad'))"""
+    page.evaluate("document.querySelector('[data-figure=attitude] .key').click()")  # one curve
+    page.evaluate("report.setView(30, 30.0005)")
+    page.settle()
+    assert re.fullmatch(r"[mµn]?rad from −?[\d.e−-]+ rad", page.evaluate(label))
+    page.evaluate("report.setView(0, 60)")
+    page.settle()
+    assert page.evaluate(label) in ("mrad", "rad")
 
 
 def test_a_verdict_leads_to_its_worst_instant(page):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from spacecraft_sim.trajectory import Recorder, Trajectory, peak
+from spacecraft_sim.trajectory import Recorder, Trajectory, between_rows, peak
 
 NUMBERS = st.floats(width=64)  # NaN, infinities and minus zero too
 
@@ -137,3 +137,13 @@ def test_peak_of_samples_alone_is_the_largest():
 def test_peak_of_nothing_is_refused():
     with pytest.raises(ValueError, match="no samples"):
         peak(np.array([]), np.array([]), np.array([]))
+
+
+def test_between_rows_an_arc_of_constant_torque_is_exact():
+    time = np.array([0.0, 0.3, 1.0, 2.5])
+    path = between_rows(time, 1 - 2 * time + 3 * time**2, -2 + 6 * time, pieces=4)
+    assert path.shape == (3, 5, 2)
+    fine = time[:-1, None] + np.diff(time)[:, None] * np.linspace(0, 1, 5)
+    # A parabola is a cubic, and its rate is linear: rounding.
+    np.testing.assert_allclose(path[..., 0], 1 - 2 * fine + 3 * fine**2, atol=1e-13)
+    np.testing.assert_allclose(path[..., 1], -2 + 6 * fine, atol=1e-13)
