@@ -1,8 +1,9 @@
 """Controls of one sign: where there is one, the least fuel is |c_2|, and multipliers fix nothing.
 
 Then h_l is constant, and every control of that sign with the right moments costs as little.  Of
-those that are on or off the one is returned that gathers its thrust about the middle: it makes
-int (s - 1/2)^2 |u| least, is on where h_l > (s - 1/2)^2 for other l, and has few edges.
+those that are on or off one is returned that gathers its thrust about the middle: it makes
+int (s - 1/2)^2 |u| least on a fine grid, and so has few edges; these then move, by as little as it
+takes, until the moments are exact.
 """
 
 import numpy as np
@@ -10,9 +11,8 @@ import numpy as np
 from controllers.completion import completed, has_moments
 from controllers.extremal import least_peak, refined
 from controllers.extremal_lp import one_signed_guess
-from controllers.moment_problem import Problem, crossings
+from controllers.moment_problem import Problem
 from controllers.moments import Array
-from spacecraft_sim.curve import Curve
 
 _ROUNDS = 10  # of refining the grid of the linear program
 
@@ -44,16 +44,12 @@ def one_signed(problem: Problem, bound: float) -> tuple[Array, Array] | None:
     nodes = np.union1d(problem.grid(), least.edges)
     for _ in range(_ROUNDS):
         guess = one_signed_guess(forward, bound, nodes)
-        h = forward.curve(guess.multipliers)
-        spread = Curve(h.a0 - 0.25, h.a1 + 1, -1.0, h.waves)  # h_l - (s - 1/2)^2
-        dual = crossings(spread, (0.0,), (0.0, 1.0))
-        for edges, pattern in (dual, (guess.edges, guess.pattern)):
-            edges, levels = completed(
-                forward, edges, bound * pattern, (0.0, bound), problem.constant(1.0)
-            )
-            if has_moments(forward, edges, levels):
-                return edges, sign * levels / bound
-        nodes = refined(nodes, np.concatenate([dual[0], guess.edges]))
+        edges, levels = completed(
+            forward, guess.edges, bound * guess.pattern, (0.0, bound), problem.constant(1.0)
+        )
+        if has_moments(forward, edges, levels):
+            return edges, sign * levels / bound
+        nodes = refined(nodes, guess.edges)
     raise ArithmeticError(
         f"there is a control of one sign within {problem.unit * bound:.9g}, but its edges do not "
         "settle"

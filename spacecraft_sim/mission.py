@@ -38,7 +38,7 @@ from spacecraft_sim.guarantee import Guarantee
 from spacecraft_sim.mechanisms import FlexibleMechanism, Mechanism
 from spacecraft_sim.physics import MujocoPhysics
 from spacecraft_sim.plant import PlantName
-from spacecraft_sim.reduced import ReducedPhysics
+from spacecraft_sim.reduced import ReducedModel, ReducedPhysics
 from spacecraft_sim.scenario import Scenario
 from spacecraft_sim.simulate import Environment, simulate
 from spacecraft_sim.spacecraft import Spacecraft
@@ -100,7 +100,7 @@ class Mission:
         return tuple(section for section in found if section.concerns(cited))
 
     @property
-    def linear_model(self) -> reduced.ReducedModel:
+    def linear_model(self) -> ReducedModel:
         """The linear model that flies as the reduced plant.
 
         Raises:

@@ -20,7 +20,7 @@ from spacecraft_sim.trajectory import Trajectory
 
 Array = np.ndarray
 Disturbance = Callable[[float], Sequence[float]]  # time, s -> torque on every input
-_RTOL, _ATOL = 1e-10, 1e-12
+_TOLERANCE = 1e-10  # of the integration, relative; a hundredth of it absolute
 _TINY = 1e-9  # of a period
 
 
@@ -33,6 +33,7 @@ def fly(
     limits: Sequence[float] | None = None,
     disturbance: Disturbance | None = None,
     every: int = 1,
+    tolerance: float = _TOLERANCE,
 ) -> tuple[Trajectory, ...]:
     """Flies a sampled law from one or many states, all integrated together.
 
@@ -44,6 +45,7 @@ def fly(
         limits: Largest torque of each input, N m; unlimited if left out.
         disturbance: Torques added to those of the law.
         every: A row is recorded at every so many samples, and at the end.
+        tolerance: Relative error allowed in a step of the integration; absolute, a hundredth.
 
     Returns:
         The flights.
@@ -80,7 +82,9 @@ def fly(
             rows.append((t, x, command, torque))
         if end - t <= _TINY * law.period:  # but for the rounding of the clock this is the end
             break
-        solver = RK45(rates, t, x.ravel(), end, first_step=end - t, rtol=_RTOL, atol=_ATOL)
+        solver = RK45(
+            rates, t, x.ravel(), end, first_step=end - t, rtol=tolerance, atol=tolerance / 100
+        )
         with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is told below
             while solver.status == "running":
                 solver.step()
@@ -129,6 +133,7 @@ def fly_continuous(
     start: Array,
     times: Array,
     disturbance: Disturbance | None = None,
+    tolerance: float = _TOLERANCE,
 ) -> Trajectory:
     """Flies the continuous-time loop, its filter started at the measured value.
 
@@ -138,6 +143,7 @@ def fly_continuous(
         start: State at the first of the times, shape (n,).
         times: Where rows are recorded, ascending, shape (k,), s.
         disturbance: Torques added to those of the law.
+        tolerance: Relative error allowed in a step of the integration; absolute, a hundredth.
 
     Returns:
         The flight, with the filtered rates `w_1` .. among its signals.
@@ -162,8 +168,8 @@ def fly_continuous(
         np.concatenate([start, zh]),
         method="DOP853",
         t_eval=times,
-        rtol=_RTOL,
-        atol=_ATOL,
+        rtol=tolerance,
+        atol=tolerance / 100,
     )
     if not run.success:
         raise ArithmeticError(f"the motion cannot be integrated on: {run.message}")

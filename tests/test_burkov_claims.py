@@ -69,7 +69,7 @@ CASES = {
 def flown(request):
     design, plant, start, duration = CASES[request.param]
     law, claims = design()
-    (run,) = fly(plant, law, starts=start, duration=duration)
+    (run,) = fly(plant, law, starts=start, duration=duration, tolerance=1e-8)
     return law, claims, plant, run
 
 
@@ -146,7 +146,7 @@ def test_the_certified_basin_is_a_hypothesis_of_the_end_alone():
     law, claims = cases.vectors(rated=False, period=2e-2)
     attitude = turned(cases.goal(), [0.0, 0.0, 3.0])
     start = BODY.state(rate=np.array([0.5, 0.5, 0.5]), attitude=attitude)
-    (run,) = fly(BODY, law, starts=start, duration=60.0)
+    (run,) = fly(BODY, law, starts=start, duration=42.0, tolerance=1e-8)
     falls, ends, stays = (claim.check(run) for claim in claims)
     (failed,) = ends.failed
     assert failed.text.startswith("V(0) < 2 min(k2, k3)")
@@ -162,7 +162,7 @@ def test_starts_in_the_certified_basin_never_come_near_another_equilibrium():
     attitudes = [turned(cases.goal(), v) for v in random.normal(size=(40, 3)) * 0.6]
     starts = BODY.state(rate=random.normal(size=(40, 3)) * 0.3, attitude=np.array(attitudes))
     count = 0
-    for run in fly(BODY, law, starts=starts, duration=6.0):
+    for run in fly(BODY, law, starts=starts, duration=6.0, tolerance=1e-8):
         verdict = stays.check(run)
         assert verdict.holds
         if verdict.bound < math.sqrt(2 * 2.4 / 1.2):  # V(0) < 2 min(k2, k3)

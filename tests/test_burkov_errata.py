@@ -251,7 +251,7 @@ def spin_values(c, side, *, inertia, beta, gamma, k):
 
 def test_15_the_upside_down_spin_is_unstable_only_under_the_condition():
     random, broken = np.random.default_rng(4), 0
-    for _ in range(400):
+    for _ in range(150):
         inertia = np.sort(random.uniform(0.2, 2, 3))[random.permutation(3)]
         if 2 * inertia.max() > inertia.sum():
             continue
@@ -277,13 +277,13 @@ def test_16_fast_members_of_the_family_are_not_stable():
     slow = 0.99 * 2 * 0.3 / 0.6
     assert spin_condition(law.formula, BODY, slow).holds
     assert spin_values(slow, 1, **gains)[1] < 0
-    _, claims = burkov.two_torques(BODY, spin=0.9, beta=0.3, gamma=0.3, k=1.6, period=1e-2)
+    _, claims = burkov.two_torques(BODY, spin=0.9, beta=0.3, gamma=0.3, k=1.6, period=3e-2)
     corrected, printed = claims[2:]
     for p, kept in ((0.9, True), (2.0, False)):
         attitude = Rotation.from_rotvec([0.0, 1e-3, 0.0]).as_matrix()
         start = BODY.state(rate=np.array([p, 0.0, 0.0]), attitude=attitude)
-        fast = replace(law, filter=replace(law.filter, period=1e-2))
-        (run,) = fly(BODY, fast, starts=start, duration=60.0)
+        fast = replace(law, filter=replace(law.filter, period=3e-2))
+        (run,) = fly(BODY, fast, starts=start, duration=40.0, tolerance=1e-8)
         assert printed.check(run).holds == kept
         assert not printed.check(run).failed  # nothing that it asks for is missing
         assert corrected.check(run).holds == kept

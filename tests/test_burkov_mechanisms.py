@@ -127,7 +127,7 @@ def test_a_constant_torque_against_gravity_has_other_equilibria():
     ]
     assert least == pytest.approx([9.66, -27.0], rel=2e-3)  # three digits known
     # A start above the next equilibrium is outside the hypotheses, and ends elsewhere.
-    (run,) = fly(ARM, law, starts=np.array([5.7, 0.4, 0.0, 0.0]), duration=12.0)
+    (run,) = fly(ARM, law, starts=np.array([5.7, 0.4, 0.0, 0.0]), duration=12.0, tolerance=1e-8)
     verdict = claims[1].check(run)
     assert not verdict.holds
     assert any("every other equilibrium" in a.text for a in verdict.failed)
@@ -204,14 +204,17 @@ def test_ten_random_starts_reach_the_position_with_elastic_joints():
             assert math.dist(q, cases.FLEXIBLE_TARGET) < 1e-9  # 46 of the longest time constants
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "reached"), [(0.9, False), (1.0, True), (1.1, True)])
 def test_torque_that_falls_short_of_gravity_does_not_hold(share, reached):
     target = (1.5, 0.5)
-    law, _ = cases.position(target=target, period=5e-3)
+    law, _ = cases.position(target=target, period=1e-2)
     assert ARM.gravity(target) == pytest.approx([41.4, 7.14], abs=0.05)  # digits known
     largest = 9.81 * np.array([3.0 * 0.5 + 2.0 + 2.0 * 0.4, 2.0 * 0.4])  # of |g_i| anywhere
     starts = random_starts(4, 2, math.pi, 0.0, seed=6)
-    for run in fly(ARM, law, starts=starts, duration=12.0, limits=share * largest, every=100):
+    for run in fly(
+        ARM, law, starts=starts, duration=9.0, limits=share * largest, every=100, tolerance=1e-8
+    ):
         off = math.dist((run["joint_1"][-1], run["joint_2"][-1]), target)
         assert (off < 0.01) == reached
 

@@ -63,31 +63,33 @@ def test_random_starts_reach_the_path():
         assert np.max(np.abs(deviations(run)[-1])) < 3e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gamma", "reached"), [(5.0, False), (8.0, False), (20.0, True)])
 def test_an_upright_path_needs_enough_gain(gamma, reached):
     programme = replace(PROGRAMME, mean=(math.pi, 0.0))
     law, (claim,) = cases.path(programme=programme, gamma=gamma, period=5e-3)
     assert claim.assumptions[0].holds == reached  # poles frozen along the path
-    (run,) = fly(ARM, law, starts=start(programme=programme), duration=12.0)
+    (run,) = fly(ARM, law, starts=start(programme=programme), duration=11.0, tolerance=1e-8)
     assert (np.max(np.abs(deviations(run, programme)[-100:])) < 0.02) == reached
     verdict = claim.check(run)
     assert verdict.holds == reached
     assert bool(verdict.failed) != reached
 
 
+@pytest.mark.slow
 def test_gain_alone_does_not_help_a_slow_filter():
-    for gamma in (50.0, 1000.0):
+    for gamma in (1000.0, 50.0):
         law, (claim,) = cases.path(gamma=gamma, nu=1.0)
         assert claim.assumptions[0].value > 0.2
-    run = fly_continuous(ARM, law, start=start(), times=np.array([0.0, 3.0]))
+    run = fly_continuous(ARM, law, start=start(), times=np.array([0.0, 10.0]))
     assert np.linalg.norm(deviations(run)[-1]) > 1e-2
 
 
 def test_the_hold_of_the_feedforward_is_counted():
     """What is left in the end is the torque's lag, half a period, over the stiffness."""
-    for period in (2e-3, 4e-3):
+    for period in (5e-3, 8e-3):
         law, (claim,) = cases.path(period=period, accuracy=1e-9)
-        (run,) = fly(ARM, law, starts=start((0, 0)), duration=7.0)
+        (run,) = fly(ARM, law, starts=start((0, 0)), duration=7.0, tolerance=1e-8)
         verdict = claim.check(run)
         assert verdict.holds
         assert verdict.measured > 0.5 * verdict.bound
@@ -180,24 +182,24 @@ def test_the_way_back_is_consistent_with_its_derivatives(deviation, rate, share)
 def test_a_new_path_spares_the_motors(x):
     peaks, ends = [], []
     for above in (None, 0.5):
-        law, _ = cases.path(replan_above=above, period=2e-3)
-        (run,) = fly(ARM, law, starts=start(x), duration=4.0)
+        law, _ = cases.path(replan_above=above, period=4e-3)
+        (run,) = fly(ARM, law, starts=start(x), duration=3.0, tolerance=1e-8)
         peaks.append([np.max(np.abs(run[f"motor_{k}"])) for k in (1, 2)])
         ends.append(np.max(np.abs(deviations(run)[-1])))
     # gamma K0 |x| pulls at first on the old path; the new one asks for the torque of a motion.
     assert peaks[0][0] == pytest.approx(200 * x[0], rel=1e-3)
     assert peaks[1][0] < 0.17 * peaks[0][0]
     assert peaks[1][1] < 0.1 * peaks[0][1]
-    assert max(ends) < 1e-3
+    assert max(ends) < 2e-3  # what the hold leaves
 
 
 def test_the_rate_of_the_new_path_is_that_of_the_filter():
     """A push from t = 2 s on carries the arm off; no velocity is read, and the new path fits it."""
-    law, _ = cases.path(replan_above=0.2, period=2e-3)
+    law, _ = cases.path(replan_above=0.2, period=4e-3)
     assert isinstance(law, Replanning)
     assert isinstance(law, Controller)
     (run,) = fly(
-        ARM, law, starts=start((0, 0)), duration=6.0,
+        ARM, law, starts=start((0, 0)), duration=6.0, tolerance=1e-8,
         disturbance=lambda t: [100.0 if 2.0 <= t < 2.4 else 0.0, 0.0],
     )  # fmt: skip
     memory, found = law.init(), None
@@ -215,7 +217,7 @@ def test_the_rate_of_the_new_path_is_that_of_the_filter():
     assert np.linalg.norm(true - old) > 1.0  # it is carried off
     # The filter lags by 1/(nu K3) = 33 ms.
     assert np.linalg.norm(true - new) < 0.5 * np.linalg.norm(true - old)
-    assert np.max(np.abs(deviations(run)[-1])) < 1e-3
+    assert np.max(np.abs(deviations(run)[-1])) < 2e-3
     assert pickle.loads(pickle.dumps(memory)) == memory
 
 

@@ -123,6 +123,20 @@ def test_least_time_of_a_rigid_body(x1, rates, bound):
     assert not any(rigid_body_can(duration=float(x), **task) for x in earlier)
 
 
+@pytest.mark.parametrize(("omega", "damping", "T"), [
+    (0.2130754307579008, 0.000295, 1.1132916192893891),  # a quarter of a rad in all
+    ([1.9550597567096597, 1.0467925881292086], [0.0, 0.0], 1.0720649272486091),
+    ([1.0, 3.56, 2.37], [0.0, 0.0, 0.0], 4.510038763400545),
+])  # fmt: skip
+def test_least_time_of_short_manoeuvres(omega, damping, T):
+    """The search sets out from the time of a rigid body, where the modes hardly turn at all."""
+    peak = min_peak(omega=omega, damping=damping, duration=T, x1=-1.24).peak
+    plan = min_time(omega=omega, damping=damping, bound=peak, x1=-1.24)
+    assert plan.duration == pytest.approx(T, rel=1e-10)
+    assert plan.peak == peak
+    assert plan.residual < 1e-10
+
+
 def test_more_modes_cost_more():
     asked = {"duration": 9.0, "x1": 1.0}
     omega, damping = [1.0, 2.6, 5.1], [0.02, 0.1, 0.3]

@@ -110,3 +110,9 @@ def test_close_pairs_are_found():
     edges, e = crossings(curve, (0.0,), (-1.0, 1.0))
     assert edges == pytest.approx([0.5 - gap, 0.5 + gap], abs=1e-10)  # eps/(2 gap)
     assert e.tolist() == [1.0, -1.0, 1.0]
+
+
+def test_rounding_errors_about_a_threshold_are_no_crossings():
+    flat = Curve(-1.0, 0.0, 0.0, [(1e-9j, 0.5)])  # cos(1e-9 s) - 1: zero to all digits
+    with pytest.raises(ArithmeticError, match=r"crosses \(0.0,\) more than 100 times"):
+        crossings(flat, (0.0,), (-1.0, 1.0))
