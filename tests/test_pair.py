@@ -1,0 +1,157 @@
+"""Two runs beside each other: one table, one figure, one recording."""
+
+import json
+
+import numpy as np
+import pytest
+import rrd
+
+from spacecraft_sim import cli, run_pair
+from spacecraft_sim.trajectory import Trajectory
+
+NAME = "efremov-nonlocal"
+SETTINGS = {
+    "one": ("duration=12.0",),
+    "seed": ("duration=12.0", "initial.attitude_scatter=0.05", "seed=3"),
+    "boom": ("duration=9.0", "booms.left.n_hinges=4", "simulation.timestep=0.01",
+             "controller.attraction_level=0.0", "reduced.source='mjcf'"),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Folders of runs by name; the law differs in `local`, the machine in `free`."""
+    base = tmp_path_factory.mktemp("pair")
+    for name, settings in SETTINGS.items():
+        cli.main(["run", NAME, "--out", str(base / name), "--set", *settings])
+    cli.main(["run", "efremov-local", "--out", str(base / "local"), "--set", "duration=12.0"])
+    free = ("spacecraft='two_boom_free'", "reduced.source='mjcf'", "duration=12.0",
+            "controller.attraction_level=0.2")  # fmt: skip
+    cli.main(["run", NAME, "--out", str(base / "free"), "--set", *free])
+    return base
+
+
+def compared(runs, a, b):
+    return run_pair.pair(run_pair.read(runs / a), run_pair.read(runs / b))
+
+
+def test_a_run_beside_itself_differs_in_nothing(runs):
+    found = compared(runs, "one", "one")
+    assert found.settings == ()
+    assert found.figures
+    assert found.claims
+    for row in (*found.figures, *found.claims):
+        assert row.difference == 0.0 or row.a is None, row
+    assert any(row.a is None for row in found.claims)  # too short a flight for the end
+    for difference in found.signals:
+        assert difference.max_error == 0.0
+
+
+def test_the_settings_that_differ_and_no_others(runs):
+    rows = {row.what: (row.a, row.b) for row in compared(runs, "one", "seed").settings}
+    assert rows == {"seed": (0, 3), "initial.attitude_scatter": (0.0, 0.05)}
+    rows = {row.what: (row.a, row.b) for row in compared(runs, "one", "boom").settings}
+    assert rows["duration"] == (12.0, 9.0)
+    left = rows.pop("booms.left.n_hinges")
+    assert left[1] == 4
+    assert left[0] != 4
+    others = {"simulation.timestep", "controller.attraction_level", "reduced.source"}
+    assert set(rows) == {"duration", *others}
+
+
+def test_two_laws_differ_in_their_parameters(runs):
+    rows = {row.what: (row.a, row.b) for row in compared(runs, "one", "local").settings}
+    assert rows["controller.law"] == ("efremov_nonlocal", "efremov_local")
+    assert rows["controller.gain"][1] is None
+
+
+def test_figures_are_those_of_the_trajectories(runs):
+    found = compared(runs, "one", "seed")
+    flights = [Trajectory.load(runs / name / "trajectory.parquet") for name in ("one", "seed")]
+    rows = {row.what: row for row in found.figures}
+    for row, values in (
+        (rows["largest attitude"], [np.abs(f["attitude_z"]).max() for f in flights]),
+        (rows["impulse spent by thruster_z"], [f["thruster_z_spent"][-1] for f in flights]),
+        (rows["largest deflection of boom left"], [abs(f["left_tip_y"]).max() for f in flights]),
+        (
+            rows["changes of command of thruster_z"],
+            [np.count_nonzero(np.diff(f["thruster_z_command"])) for f in flights],
+        ),
+    ):
+        assert (row.a, row.b) == tuple(values)
+        assert row.difference == values[1] - values[0]
+
+
+def test_signals_are_compared_at_common_instants_as_b_minus_a(runs):
+    found = {d.signal: d for d in compared(runs, "one", "seed").signals}
+    a, b = (Trajectory.load(runs / name / "trajectory.parquet") for name in ("one", "seed"))
+    _, i, j = np.intersect1d(a.time, b.time, return_indices=True)
+    assert len(i) > 100
+    wanted = np.abs(b["attitude_z"][j] - a["attitude_z"][i]).max()
+    assert found["attitude_z"].max_error == wanted > 0.001
+
+
+def test_claims_of_both_come_first_and_those_of_one_have_a_gap(runs):
+    rows = compared(runs, "one", "local").claims
+    claims = [{v.claim for v in run_pair.read(runs / n).verdicts} for n in ("one", "local")]
+    both = [all(row.what in known for known in claims) for row in rows[:-1]]
+    assert both == sorted(both, reverse=True)
+    assert not all(both)
+    assert rows[-1].what == "claims that hold"
+
+
+@pytest.mark.parametrize(("a", "b"), [("one", "seed"), ("one", "local"), ("free", "boom")])
+def test_the_command_writes_table_figure_and_recording(a, b, runs, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert cli.main(["compare", str(runs / a), str(runs / b), "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert "B - A" in shown
+    assert "largest attitude [rad]" in shown
+    assert {p.name for p in out.iterdir()} == {
+        "comparison.json", "comparison.png", "recording.rrd"
+    }  # fmt: skip
+    assert (out / "comparison.png").read_bytes().startswith(b"\x89PNG")
+    table = json.loads((out / "comparison.json").read_text())
+    assert table["a"]["folder"].endswith(a)
+    assert table["b"]["folder"].endswith(b)
+    for group in ("settings", "figures", "claims"):
+        for row in table[group]:
+            assert {"what", "unit", "a", "b", "difference"} == set(row)
+    entities = rrd.read(out / "recording.rrd")
+    assert rrd.stores(out / "recording.rrd") == (1, 1)
+    for key, name in (("A", a), ("B", b)):
+        flight = Trajectory.load(runs / name / "trajectory.parquet")
+        found = entities[f"/attitude/{key}"]
+        np.testing.assert_allclose(found.time, flight.time, rtol=0, atol=1.1e-9)
+        last = [
+            flight[f"attitude_{axis}"][-1] for axis in "xyz" if f"attitude_{axis}" in flight.signals
+        ]
+        assert set(found.values["Scalars:scalars"][-1]) <= set(last)
+        assert found.values["Scalars:scalars"][-1][-1] == flight["attitude_z"][-1]
+        assert f"/relay/thruster_z/{key}_delivered" in entities
+        assert entities[f"/world/{key}/bus"].time[-1] == pytest.approx(flight.time[-1])
+    (page,) = entities["/verdicts"].static["TextDocument:text"]
+    assert page.startswith("# A: ")
+    for row in table["settings"]:
+        assert row["what"] in page
+
+
+@pytest.mark.parametrize("missing", ["scenario.toml", "trajectory.parquet"])
+def test_what_is_not_the_folder_of_a_run_is_refused(missing, runs, tmp_path, capsys):
+    for path in (runs / "one").iterdir():
+        if path.name != missing:
+            (tmp_path / path.name).write_bytes(path.read_bytes())
+    out = tmp_path / "out"
+    assert cli.main(["compare", str(runs / "one"), str(tmp_path), "--out", str(out)]) == 2
+    message = capsys.readouterr().err
+    assert str(tmp_path) in message
+    assert missing in message
+    assert not out.exists()
+
+
+def test_an_old_folder_is_not_touched(runs, tmp_path, capsys):
+    (tmp_path / "notes.txt").write_text("precious")
+    words = ["compare", str(runs / "one"), str(runs / "seed"), "--out", str(tmp_path)]
+    assert cli.main(words) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]

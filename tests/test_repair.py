@@ -1,0 +1,125 @@
+"""A run that is killed leaves a recording that reads, and `repair` makes it whole."""
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import rrd
+
+from spacecraft_sim import cli, mission
+from spacecraft_sim.repair import end, repair
+
+NAME = "efremov-nonlocal"
+
+
+def killed(out, size):
+    """The recording of a long run, killed as soon as its file has a size, bytes."""
+    words = ["run", NAME, "--out", str(out), "--set", "duration=1500.0"]
+    run = subprocess.Popen([sys.executable, "-m", "spacecraft_sim.cli", *words])
+    path, deadline = out / "recording.rrd", time.monotonic() + 120
+    while not path.exists() or path.stat().st_size < size:
+        assert run.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    return path
+
+
+@pytest.fixture(scope="module")
+def broken(tmp_path_factory):
+    """A recording of a killed run, some chunks into its flight on MuJoCo."""
+    return killed(tmp_path_factory.mktemp("killed") / "run", 1_500_000)
+
+
+def test_the_file_of_a_killed_run_reads_up_to_its_last_rows(broken):
+    entities = rrd.read(broken)
+    assert rrd.stores(broken) == (1, 1)  # with its layout
+    found = entities["/attitude/simulated"]
+    assert len(found.time) > 250
+    duration = f"duration={np.ceil(found.time[-1] + 1)}"
+    flight = mission.assemble(mission.load_scenario(NAME, (duration,))).fly()
+    rows = flight.time[: len(found.time)]
+    np.testing.assert_allclose(found.time, rows, rtol=0, atol=1.1e-9)  # whole nanoseconds
+    wanted = flight["attitude_z"][: len(rows)]
+    np.testing.assert_array_equal(found.array("Scalars:scalars")[:, 0], wanted)
+    (page,) = entities["/verdicts"].static["TextDocument:text"]
+    assert page.startswith("# Not judged")
+    with pytest.raises(RuntimeError, match="without footer"):
+        rrd.chunks(broken)
+
+
+def test_repair_restores_the_footer_and_changes_nothing_else(broken, tmp_path, capsys):
+    path = shutil.copy(broken, tmp_path / "recording.rrd")
+    before = rrd.read(path)
+    assert cli.main(["repair", str(path)]) == 0
+    shown = capsys.readouterr().out
+    last = max(entity.time[-1] for entity in before.values() if len(entity.time))
+    assert f"repaired; it reads up to t = {last:.6g} s" in shown
+    assert rrd.chunks(path) > 100
+    assert rrd.stores(path) == (1, 1)
+    after = rrd.read(path)
+    assert set(after) == set(before)
+    for name, entity in before.items():
+        assert entity.static == after[name].static
+        assert entity.values == after[name].values
+        np.testing.assert_array_equal(entity.time, after[name].time)
+    assert [p.name for p in tmp_path.iterdir()] == ["recording.rrd"]
+
+
+def test_what_is_whole_is_left_alone(broken, tmp_path, capsys):
+    path = shutil.copy(broken, tmp_path / "recording.rrd")
+    assert repair(path)
+    data = path.read_bytes()
+    assert not repair(path)
+    assert path.read_bytes() == data
+    assert cli.main(["repair", str(path)]) == 0
+    assert "whole already" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("share", [0.3, 0.55, 0.999])
+def test_a_file_cut_anywhere_is_repaired_as_far_as_it_reads(broken, share, tmp_path):
+    data = broken.read_bytes()
+    path = tmp_path / "cut.rrd"
+    path.write_bytes(data[: int(share * len(data)) + 7])
+    assert repair(path)
+    assert rrd.chunks(path)
+    whole, found = rrd.read(broken), rrd.read(path)
+    assert 0 < end(path) <= max(e.time[-1] for e in whole.values() if len(e.time))
+    entity = found["/attitude/simulated"]
+    wanted = whole["/attitude/simulated"].values["Scalars:scalars"][: len(entity.time)]
+    assert entity.values["Scalars:scalars"] == wanted
+
+
+@pytest.mark.parametrize(
+    ("data", "word"),
+    [
+        (None, "No such file"),
+        (b"", "not a recording"),
+        (b"title = 'a scenario'", "not a recording"),
+        (b"RRF2" + bytes(400), "nothing of it can be read"),
+    ],
+)
+def test_what_cannot_be_repaired_is_refused_and_left_alone(data, word, tmp_path, capsys):
+    path = tmp_path / "mine.rrd"
+    if data is not None:
+        path.write_bytes(data)
+    assert cli.main(["repair", str(path)]) == 2
+    message = capsys.readouterr().err
+    assert word in message
+    assert str(path) in message
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == ([] if data is None else [data])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [1, 20_000, 150_000, 700_000])
+def test_a_run_may_be_killed_at_any_moment(size, tmp_path):
+    path = killed(tmp_path / "run", size)
+    whole = not repair(path)
+    assert not whole
+    assert rrd.stores(path)[0] == 1
+    assert "/scenario" in rrd.read(path)
