@@ -24,6 +24,7 @@ def main(argv: list[str] | None = None) -> int:
     flight_cost.controlled_step(span=arguments.span, rounds=arguments.rounds)
     flight_cost.whole_run(duration=arguments.duration, rounds=min(arguments.rounds, 3))
     plan_cost.beside_cvxpy(rounds=min(arguments.rounds, 3))
+    recording_cost.recording(duration=arguments.duration, rounds=min(arguments.rounds, 5))
     relay_cost.beside_rivals(rounds=min(arguments.rounds, 3))
     relay_cost.growth(longest=arguments.longest)
     return 0

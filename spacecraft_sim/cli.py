@@ -196,6 +196,8 @@ def _run(arguments: argparse.Namespace) -> int:
         traceback.print_exc()
         print(f"spacecraft-sim: the run crashed; what it wrote is in {folder}", file=sys.stderr)
         return BROKEN
+    if recording.trouble:
+        print(f"spacecraft-sim: the viewer was lost: {recording.trouble}", file=sys.stderr)
     console = terminal.console()
     console.print(_verdict_table(comparison))
     console.print(_difference_line(comparison))

@@ -163,6 +163,8 @@ def suited_factor(flight: Trajectory, lengths: Mapping[str, float]) -> float:
         flight: A flight with the tips of its booms.
         lengths: Length of each boom, m.
     """
+    if not lengths:
+        return 1.0
     largest = 1e-4
     for boom, length in lengths.items():
         for axis in "yz":

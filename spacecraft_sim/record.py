@@ -218,7 +218,7 @@ class Recording:
         self._planes = record_chart.planes(subject.charts, beneath.known, subject.band)
         duration = float(flight.time[-1]) or 1.0
         self._spacing = min(0.05, duration / 1500)
-        self._end = flight.time[0]
+        self._end, self._edges = float(flight.time[0]), 0
         root, other = self._root(beneath.over_key), self._root(beneath.key)
         record_scene.solids(stream, root, self._rest, self._bodies, False)
         record_scene.solids(stream, other, beneath.rest, beneath.bodies, True)
@@ -258,9 +258,8 @@ class Recording:
         record_scene.motion(stream, root, beside, self._rest, self._bodies)
         self._signals(part, beneath.over_key, self._channels, self._nozzles)
         end = float(part.time[-1])
-        if subject.band:
-            record_signals.band(stream, self._end, end, subject.band, self._spacing)
         self._end = end
+        self._fill_band(end)
         self._show_beneath(end)
         self._flush()
 
@@ -272,8 +271,7 @@ class Recording:
             page: What stands in place of the table of verdicts, as Markdown.
         """
         longest = float(self._beneath.flight.time[-1])
-        if self._subject.band and longest > self._end:
-            record_signals.band(self._stream, self._end, longest, self._subject.band, self._spacing)
+        self._fill_band(longest)
         self._show_beneath(longest)
         record_signals.verdict_events(self._stream, verdicts, self._end)
         title, notes = self._subject.title, self._beneath.notes
@@ -286,6 +284,11 @@ class Recording:
             reason: Why.
         """
         record_signals.remark(self._stream, self._end, reason)
+
+    def _fill_band(self, end: float) -> None:
+        if width := self._subject.band:
+            stream, spacing = self._stream, self._spacing
+            self._edges = record_signals.band(stream, self._edges, end, width, spacing)
 
     def _show_beneath(self, end: float) -> None:
         """The rows of the flight beneath up to an instant."""

@@ -132,22 +132,25 @@ def band_style(stream: Stream, band: float) -> None:
     stream.log("bound/angle", look, static=True)
 
 
-def band(stream: Stream, start: float, stop: float, band: float, spacing: float) -> None:
+def band(stream: Stream, first: int, stop: float, band: float, spacing: float) -> int:
     """Logs the bound of the angle as a band: a line so quick between its edges that it fills it.
 
     Args:
         stream: The recording.
-        start: From when, s.
+        first: How many points of the line are logged already.
         stop: Until when, s.
         band: Half-width, rad.
         spacing: Time from edge to edge, s.
+
+    Returns:
+        How many points are logged now.
     """
-    first, last = int(np.ceil(start / spacing)), int(np.floor(stop / spacing))
-    count = np.arange(first, last + 1)
+    count = np.arange(first, int(stop / spacing + 1e-6) + 1)
     if len(count):
         times = [rr.TimeColumn(TIMELINE, duration=count * spacing)]
         edges = rr.Scalars.columns(scalars=np.where(count % 2, -band, band))
         stream.send_columns("bound/angle", times, edges)
+    return first + len(count)
 
 
 def lane_styles(stream: Stream, channels: Sequence[Channel], name: str, beneath: bool) -> None:

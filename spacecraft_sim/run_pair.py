@@ -17,6 +17,7 @@ from spacecraft_sim.trajectory import Trajectory
 from spacecraft_sim.versions import versions
 
 Array = np.ndarray
+Figures = dict[tuple[str, str], float | None]  # by name and unit; None if there is no such figure
 _READINGS = {
     f"{kind}_{axis}"
     for kind in ("attitude", "quasi_rigid_angle", "rate", "quasi_rigid_rate")
@@ -50,8 +51,8 @@ class Row:
     Attributes:
         what: What is compared.
         unit: Unit of both, empty if there is none.
-        a: Of run A; None if it has no such thing.
-        b: Of run B; None if it has no such thing.
+        a: Of run A; None if it has no such thing, or no figure for it.
+        b: Of run B; likewise.
     """
 
     what: str
@@ -223,10 +224,9 @@ def _flat(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{prefix}{key}", value
 
 
-def _figures(flight: Trajectory) -> dict[tuple[str, str], float]:
-    """Figures of a flight by name and unit."""
+def _figures(flight: Trajectory) -> Figures:
     late = flight.time >= flight.time[0] + (1 - LATE) * (flight.time[-1] - flight.time[0])
-    found = {("flight", "s"): float(flight.time[-1])}
+    found: Figures = {("flight", "s"): float(flight.time[-1])}
     for kind in ("attitude", "quasi_rigid_angle", "rate"):
         names = [f"{kind}_{axis}" for axis in "xyz" if f"{kind}_{axis}" in flight.signals]
         if names:
@@ -248,13 +248,16 @@ def _figures(flight: Trajectory) -> dict[tuple[str, str], float]:
 
 
 def _claims(a: Run, b: Run) -> Iterator[Row]:
-    measured = [{(v.claim, v.unit): v.measured for v in run.verdicts} for run in (a, b)]
+    measured = [
+        {(v.claim, v.unit): v.measured if math.isfinite(v.measured) else None for v in run.verdicts}
+        for run in (a, b)
+    ]
     yield from _beside(*measured)
     holds = [sum(v.holds for v in run.verdicts) for run in (a, b)]
     yield Row(what="claims that hold", unit="", a=holds[0], b=holds[1])
 
 
-def _beside(a: dict[tuple[str, str], float], b: dict[tuple[str, str], float]) -> Iterator[Row]:
+def _beside(a: Figures, b: Figures) -> Iterator[Row]:
     for what, unit in dict.fromkeys([*(k for k in a if k in b), *a, *b]):
         yield Row(what=what, unit=unit, a=a.get((what, unit)), b=b.get((what, unit)))
 
