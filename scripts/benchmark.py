@@ -6,7 +6,7 @@ Times of one machine say little; the ratios carry over.
 import argparse
 import sys
 
-from support import flight_cost, plan_cost, relay_cost
+from support import flight_cost, plan_cost, recording_cost, relay_cost
 
 
 def main(argv: list[str] | None = None) -> int:
