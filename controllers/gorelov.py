@@ -29,7 +29,7 @@ from spacecraft_sim.checks import positive
 from spacecraft_sim.curve import Curve
 
 _EQUAL = 1e-12  # two peaks this close, relative, are the same
-_STEPS = 100  # towards the least time; ten are many
+_STEPS = 200  # towards the least time; some twenty are many
 
 
 def min_energy(
@@ -186,16 +186,17 @@ def _first_time(
     modes: Modes, T: float, bound: float, x0: float, v0: float, x1: float, v1: float
 ) -> tuple[Problem, Extremal]:
     """First duration from T on for which the bound suffices; T itself must not be beyond it."""
-    near, stalled = None, 0
+    near = None
     for _ in range(_STEPS):
         task = problem_of(modes, duration=T, x0=x0, v0=v0, x1=x1, v1=v1)
-        near = least_peak(task, near=near)
-        if task.unit * near.peak <= bound * (1 + _EQUAL):
-            return task, near
-        following = _next_time(modes, task.multipliers(near.multipliers), T, bound, x1 - x0, v0, v1)
-        # At the end rounding decides; small steps on lead out of it.
-        stalled += following < T * (1 + 1e-10)
-        T = float(max(following, T * (1 + 1e-15 * 2**stalled)))
+        lam = task.target
+        if task.unit <= bound:  # else the control of least energy shows that T is too short
+            near = least_peak(task, near=near)
+            if task.unit * near.peak <= bound * (1 + _EQUAL):
+                return task, near
+            lam = near.multipliers
+        following = _next_time(modes, task.multipliers(lam), T, bound, x1 - x0, v0, v1)
+        T = max(float(following), math.nextafter(T, math.inf))
     raise ArithmeticError(f"no duration found in {_STEPS} steps; the last was {T} s")
 
 

@@ -177,3 +177,10 @@ def variations(base: Scenario, duration: float) -> Iterator[tuple[str, Result]]:
     for table in chosen:
         pulsed = {"thruster_z": {"min_on_time": 1.0}}
         yield f"{table['profile']}, pulses of 1 s at least", flown(base, table, thrusters=pulsed)
+    for table in tables(base, duration, 1):
+        if table["profile"] in ("zv", "ei"):
+            coarse = {"thruster_z": {"levels": [flown(base, table).peak]}}
+            yield (
+                f"{table['profile']}, with its highest level alone",
+                flown(base, table, thrusters=coarse),
+            )
