@@ -84,7 +84,7 @@ def _with_pulses(
         cost=np.concatenate([*(np.maximum(d, 0) for d in dearer), np.zeros(k), [lam @ growth]]),
         equations=np.column_stack([*((x - now) * q for x in pulses), steps, growth]),
         right=lack / size,
-        low=np.concatenate([np.zeros(n), np.full(k, -most), [0.0 if weight else -most]]),
+        low=np.concatenate([np.zeros(n), np.full(k, -most), [0.0]]),
         high=np.concatenate([np.full(n + k, most), [0.0 if weight else most]]),
     )
     lengths = size * x[:n].reshape(len(pulses), -1)

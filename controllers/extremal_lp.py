@@ -144,18 +144,10 @@ def _switched(nodes: Array, v: Array, levels: tuple[float, ...]) -> tuple[Array,
             low = max(level for level in levels if level < x)
             high = min(level for level in levels if level > x)
             part = d * (x - low) / (high - low)  # time at the upper level
-            before = nearest[k - 1] >= high if k else False
-            after = nearest[k + 1] >= high if k + 1 < len(v) else False
-            if before and after:
-                pieces = [(start + part / 2, high), (start + d - part / 2, low)]
-                pieces.append((nodes[k + 1], high))
-            elif before:
+            if k and nearest[k - 1] >= high:
                 pieces = [(start + part, high), (nodes[k + 1], low)]
-            elif after:
-                pieces = [(start + d - part, low), (nodes[k + 1], high)]
             else:
-                pieces = [(start + (d - part) / 2, low), (start + (d + part) / 2, high)]
-                pieces.append((nodes[k + 1], low))
+                pieces = [(start + d - part, low), (nodes[k + 1], high)]
         for end, level in pieces:
             if pattern and pattern[-1] == level:
                 edges[-1] = end

@@ -73,8 +73,7 @@ def impulse_limit(
     gap = np.inf
     for _ in range(_ROUNDS):
         rough = _on_grid(problem, nodes)
-        exact = [_newton(problem, *guess) for guess in (rough, _merged(nodes, *rough))]
-        for s, impulses, lam in (rough, *exact):
+        for s, impulses, lam in (rough, _newton(problem, *_merged(nodes, *rough))):
             turns = _extremes(problem, lam)
             highest = float(np.max(np.abs(lam @ problem.functions(turns))))
             fuel, lower = float(np.abs(impulses).sum()), float(lam @ problem.target) / highest

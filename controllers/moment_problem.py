@@ -192,11 +192,9 @@ def problem_of(
     c[0] /= duration
     own = modes.scaled(duration)
     s, weights = quadrature(own, 1.0)
-    h = own.functions(s)
-    size = np.max(np.abs(h), axis=1)
     # From the functions and not from their Gram matrix, whose root loses half of the digits.
-    R = np.linalg.qr((h / size[:, None] * np.sqrt(weights)).T, mode="r")
-    W = np.linalg.inv(R).T / size
+    R = np.linalg.qr((own.functions(s) * np.sqrt(weights)).T, mode="r")
+    W = np.linalg.inv(R).T
     unit = float(np.linalg.norm(W @ c))
     c /= unit
     return Problem(duration=duration, unit=unit, modes=own, W=W, moments=c, target=W @ c)

@@ -61,6 +61,31 @@ def test_several_modes():
     assert limit.fuel < min_fuel(**asked, bound=3 * min_peak(**asked).peak).fuel
 
 
+HARD = [
+    # Two impulses of one sign a thirtieth of a period apart, and others that are one.
+    ([5.568764623084885], [0.0], 13.59765625, 0.0, 0.0),
+    ([3.0], [0.01], 20.0, 0.0, 0.0),
+    (
+        [0.7003765801299274, 2.5399394369504185, 6.268795879354048],
+        [0.10933819135702172, 0.13729786499705152, 0.39740156160509765],
+        41.07632995839695, 0.011323049658171703, 0.02382806213235525,
+    ),
+    ([1.958, 3.921, 13.99], [0.2038, 0.2044, 0.3012], 3.136, 0.0, 0.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("omega", "zeta", "T", "v0", "v1"), HARD)
+def test_hard_cases(omega, zeta, T, v0, v1):
+    damping = [2 * z * w for z, w in zip(zeta, omega, strict=True)]
+    limit = impulse_limit(omega=omega, damping=damping, duration=T, x1=1.0, v0=v0, v1=v1)
+    modes = modes_of(omega, damping)
+    h = limit.multipliers @ modes.functions(np.linspace(0, T, 4001))
+    assert np.max(np.abs(h)) < 1 + 1e-8
+    value = limit.multipliers[:2] @ [1 - T * v0, v1 - v0]
+    assert value == pytest.approx(limit.fuel, rel=1e-8)
+    assert limit.residual < 1e-10
+
+
 def test_empty_manoeuvres_are_refused():
     with pytest.raises(ValueError, match="the manoeuvre is empty"):
         impulse_limit(omega=1.0, damping=0.0, duration=8.0, x1=0.0)

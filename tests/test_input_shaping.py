@@ -97,6 +97,8 @@ def test_ei_that_is_not_there():
     assert ei_shaper(omega=1.0, damping=1.2).amplitudes.sum() == pytest.approx(1)  # ratio 0.6
     with pytest.raises(ValueError, match=r"no EI shaper found .* ratio of 0.8 .* lost at .* 0\.6"):
         ei_shaper(omega=1.0, damping=1.6)
+    with pytest.raises(ValueError, match="no EI shaper found"):
+        ei_shaper(omega=1.0, damping=0.9, tolerance=0.2)
     for tolerance, words in ((0.0, "tolerance = 0.0"), (1.0, "take less than 1")):
         with pytest.raises(ValueError, match=words):
             ei_shaper(omega=1.0, damping=0.1, tolerance=tolerance)
@@ -203,6 +205,14 @@ def test_steps_that_meet_are_one():
     level = plan.levels[0]
     assert plan.levels == pytest.approx([level, 0.0, -level], abs=1e-12)
     assert plan.levels[1] == 0.0
+
+
+def test_steps_that_cancel_are_none():
+    """The reversal of the first quarter of the command meets the start of its half."""
+    half = math.pi
+    plan = zvd(omega=1.0, damping=0.0, x1=1.0, duration=4 * half)
+    assert plan.switch_times == pytest.approx([2 * half], abs=1e-12)
+    assert plan.levels[0] == -plan.levels[1]
 
 
 # -- bad input -------------------------------------------------------------------------------------
