@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
+from matplotlib.gridspec import GridSpec, GridSpecBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
@@ -29,6 +29,7 @@ DASHES = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)))  # of the axis that moves most, a
 COLUMNS = {"claim": 0.035, "predicted": 0.515, "measured": 0.63, "bound": 0.75}
 COLUMNS |= {"unit": 0.77, "margin": 0.92, "worst at": 0.995}
 REST = 1e-9  # share of the angle, and rad/s, that count as no motion
+ROW = 0.3  # height of a row of the table, inches
 FEW = 3000  # rows of a track that is drawn between them too
 DENSE = 160  # commands in a panel that would hide what they cross
 
@@ -58,18 +59,19 @@ def summary(
     """
     channels, bands = channel_units(measured, drawing), bands or {}
     lanes = max(1.0, 0.42 * len(channels))  # inches
-    heights = [1.9, 2.3, 2.3, max(0.3 * (len(verdicts) + 1), 2 * lanes + 0.6)]
+    table = ROW * (len(verdicts) + 1)
+    heights = [1.9, 2.3, 2.3, table if histories else max(table, 2 * lanes + 0.6)]
     edges = np.cumsum([1.12, heights[0], 0.55, heights[1], 0.62, heights[2], 0.72, heights[3]])
     height = edges[-1] + 0.4
     figure = Figure(figsize=(WIDTH, height), dpi=DPI)
     FigureCanvasAgg(figure)  # the figure keeps it
     rows = 1 - edges.reshape(4, 2) / height  # top and bottom of each, as shares of the page
     _heading(figure, title, verdicts, 1 - 0.36 / height)
-    end, late = float(measured.time[-1]), spans.last_cycles(measured)
+    late = spans.last_cycles(measured)
     strip = [figure.add_subplot(cell) for cell in _grid(figure, rows[0], FRAMES, 0.012, 0.03)]
     note = film(strip, drawing, measured)
     figure.text(0.012, 1 - 0.72 / height, note, size=9.5, color=SOFT, va="center")
-    _key(figure, 1 - 0.72 / height, moving_axes(measured, "attitude"), bands)
+    _key(figure, 1 - 0.72 / height, [] if histories else moving_axes(measured, "attitude"), bands)
     for row, zoom in ((rows[1], False), (rows[2], True)):
         start = late if zoom else measured.time[0]
         flights = _since(predicted, start), _since(measured, start)
@@ -85,16 +87,12 @@ def summary(
         words = "END OF THE FLIGHT" if zoom else "WHOLE FLIGHT"
         style = {"size": 9, "color": SOFT, "weight": "bold", "rotation": 90, "va": "center"}
         figure.text(0.016, row.mean(), words, ha="center", **style)
-    table, thrust = _grid(figure, rows[3], 2, 0.012, 0.1, (2, 1))
-    _table(figure.add_subplot(table), verdicts)
-    grid = thrust.subgridspec(2, 1, hspace=0.55 / lanes)
-    settled = min(1.3 * spans.settled(measured) + 1, end)
-    for k, span in enumerate(((0.0, settled), (late, end))):
-        dense = _thrust(axes := figure.add_subplot(grid[k]), measured, channels, span)
-        unit = " or ".join(sorted(set(channels.values()))) or "N"
-        line = "commands too dense" if dense else "line: commanded"
-        words = f"Thrust, {unit}, log levels; filled: delivered; {line}"
-        panel(axes, f"The same at the end{'; ' + line if dense else ''}" if k else words)
+    if histories:  # which show the torques
+        _table(figure.add_subplot(_grid(figure, rows[3], 1, 0.012, 0.0)[0]), verdicts)
+    else:
+        table, thrust = _grid(figure, rows[3], 2, 0.012, 0.1, (2, 1))
+        _table(figure.add_subplot(table), verdicts)
+        _lanes(figure, thrust.subgridspec(2, 1, hspace=0.55 / lanes), measured, channels)
     figure.savefig(path, pil_kwargs={"compress_level": 3})
 
 
@@ -149,10 +147,14 @@ def panel(axes: Axes, title: str, x: str = "", y: str = "", below: bool = False)
     axes.spines[["left", "bottom"]].set_color("#b9c0cc")
     handles = axes.get_legend_handles_labels()[0]
     if handles:
-        place = {"loc": "upper left", "bbox_to_anchor": (0, -0.055)} if below else {}
+        deep = (0.45 if x else 0.19) * DPI / axes.get_window_extent().height  # under the ticks
+        place = {"loc": "upper left", "bbox_to_anchor": (0, -deep)} if below else {}
         place = place or {"loc": "lower right", "bbox_to_anchor": (1.01, 0.985)}
-        columns = 4 if below else len(handles)
-        axes.legend(fontsize=8.5, frameon=False, ncols=columns, borderpad=0.2, **place)
+        columns = (4 if x else 6) if below else len(handles)
+        look = {"fontsize": 8.5, "frameon": False, "borderpad": 0.2}
+        if not x:  # a narrow panel
+            look |= {"handlelength": 1.0, "columnspacing": 0.9, "handletextpad": 0.4}
+        axes.legend(ncols=columns, **look, **place)
 
 
 def _angle(axes: Axes, flights: Flights, kind: str, bands: Mapping[str, float], zoom: bool) -> None:
@@ -198,7 +200,7 @@ def _histories(
     for time, value, color, width, dashes in drawn:
         look = {"color": color, "linewidth": width, "linestyle": dashes}
         axes.plot(time, (value - base) / scale, **look)
-    _time_axis(axes, flights[1].time[0], flights[1].time[-1])
+    time_axis(axes, flights[1].time[0], flights[1].time[-1])
     return peak / scale, scale, f"{letter}rad{f' from {base:.6g} rad' if base else ''}"
 
 
@@ -212,7 +214,14 @@ def _base(values: Sequence[Array]) -> float:
     return round((low + high) / 2, -math.floor(math.log10(max(span, 1e-6 * size))) - 1)
 
 
-def _time_axis(axes: Axes, start: float, end: float) -> None:
+def time_axis(axes: Axes, start: float, end: float) -> None:
+    """Sets the limits of a time axis, its ticks with their unit.
+
+    Args:
+        axes: The axes.
+        start: Where it begins, s.
+        end: Where it ends, s.
+    """
     axes.set_xlim(start, end)
     axes.xaxis.set_major_locator(MaxNLocator(6, steps=(1, 2, 5, 10)))
     axes.xaxis.set_major_formatter(lambda t, _: f"{t:g} s")
@@ -238,7 +247,7 @@ def _tips(axes: Axes, flights: Flights, booms: Sequence[str]) -> None:
         style = {"transform": axes.transAxes, "ha": "right", "size": 9, "weight": "bold"}
         axes.text(place, 1.03, boom, color=color, **style)
         place -= 0.024 * len(boom) + 0.03
-    _time_axis(axes, flights[1].time[0], flights[1].time[-1])
+    time_axis(axes, flights[1].time[0], flights[1].time[-1])
     return panel(axes, f"Boom tips, deflection, {letter}m")
 
 
@@ -264,6 +273,20 @@ def _phase_plane(axes: Axes, flights: Flights, bands: Mapping[str, float], zoom:
         if half := bands.get(x, 0.0):
             axes.axvspan(-half / sx, half / sx, color=GOOD, alpha=0.15, linewidth=0)
     return panel(axes, f"Phase plane {axis}: {py}rad/s over {px}rad")
+
+
+def _lanes(
+    figure: Figure, grid: GridSpecBase, measured: Trajectory, channels: dict[str, str]
+) -> None:
+    """Thrust until the flight has settled, and at its end."""
+    end = float(measured.time[-1])
+    settled = min(1.3 * spans.settled(measured) + 1, end)
+    for k, span in enumerate(((0.0, settled), (spans.last_cycles(measured), end))):
+        dense = _thrust(axes := figure.add_subplot(grid[k]), measured, channels, span)
+        unit = " or ".join(sorted(set(channels.values()))) or "N"
+        line = "commands too dense" if dense else "line: commanded"
+        words = f"Thrust, {unit}, log levels; filled: delivered; {line}"
+        panel(axes, f"The same at the end{'; ' + line if dense else ''}" if k else words)
 
 
 def _thrust(
@@ -300,7 +323,7 @@ def _thrust(
         axes.text(0.004, middle + 1.05, words, size=8.5, color=INK, **place)
     axes.set_yticks(list(ticks), list(ticks.values()))
     axes.set_ylim(-pitch * max(len(channels) - 1, 0) - 1.2, pitch - 1.2)
-    _time_axis(axes, *span)
+    time_axis(axes, *span)
     return dense
 
 
@@ -318,7 +341,7 @@ def _log_heights(levels: Array) -> Callable[[Array], Array]:
 
 def _table(axes: Axes, verdicts: Sequence[Verdict]) -> None:
     axes.set_axis_off()
-    axes.set(xlim=(0, 1), ylim=(max(len(verdicts) + 1, 8), 0))
+    axes.set(xlim=(0, 1), ylim=(axes.get_window_extent().height / DPI / ROW, 0))
     axes.plot([0, 1], [0.95, 0.95], color=INK, linewidth=1)
     for head, x in COLUMNS.items():
         side = "left" if head in ("claim", "unit") else "right"

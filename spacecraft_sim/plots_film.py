@@ -38,14 +38,16 @@ def film(strip: list[Axes], drawing: Drawing, measured: Trajectory) -> str:
     outlines = [_outlines(drawing, frame, view) for frame in frames]
     points = [p for parts in drawn for pair in parts for p in pair]
     points += [p for parts in outlines for p, *_ in parts]
-    reach = np.max([np.abs(p).max(axis=0) for p in points], axis=0)
+    low = np.min([p.min(axis=0) for p in points], axis=0)
+    high = np.max([p.max(axis=0) for p in points], axis=0)
+    (x, y), reach = (low + high) / 2, (high - low) / 2
     # Every frame shows the same window, with equal scales.
     box = strip[0].get_window_extent()
     width = 1.06 * max(reach[0], reach[1] * box.width / box.height)
     height = width * box.height / box.width
     for axes, frame, booms, shapes in zip(strip, frames, drawn, outlines, strict=True):
         axes.set(xticks=[], yticks=[], facecolor=SHADE)
-        axes.set(xlim=(-width, width), ylim=(-height, height))
+        axes.set(xlim=(x - width, x + width), ylim=(y - height, y + height))
         axes.spines[:].set_visible(False)
         for k, (bent, straight) in enumerate(booms):
             axes.plot(*straight.T, color=SOFT, linewidth=0.8, linestyle=(0, (4, 3)))
@@ -59,7 +61,8 @@ def film(strip: list[Axes], drawing: Drawing, measured: Trajectory) -> str:
         axes.set_title(thrust, loc="right", y=1.0, size=9, color=SOFT, pad=4)
     size = f"drawn × {factor:g}" if factor > 1 else "to scale"
     bending = f"; bending {size}, dashed: unbent" if lines else ""
-    return f"{view.words[0].upper()}{view.words[1:]}{bending}; arrows: thrust on the craft"
+    arrows = "; arrows: thrust on the craft" if drawing.jets else ""
+    return f"{view.words[0].upper()}{view.words[1:]}{bending}{arrows}"
 
 
 def _lines(

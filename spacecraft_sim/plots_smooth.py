@@ -5,33 +5,25 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from spacecraft_sim.plots import PLANTS, Flights, panel, prefix
+from spacecraft_sim.families import families
+from spacecraft_sim.plots import PLANTS, Flights, panel, prefix, time_axis
 from spacecraft_sim.plots_film import BOOMS
 from spacecraft_sim.trajectory import Trajectory
 
 Panel = Callable[[Axes, Flights, bool], None]  # draws the whole flight, or its end
-WHEN = ("whole flight", "end of the flight")
 _SHOWN = 9  # curves that a panel can carry
+_LEAST = 1e-17  # difference that a logarithmic axis shows as zero
 
 
 def panels(measured: Trajectory) -> tuple[Panel, ...]:
-    """Returns the four panels that suit a flight: positions, rates, torques, and the difference.
+    """Returns the four panels that suit a flight: places, rates, torques, and the difference.
 
     Args:
         measured: Flight of the full plant.
     """
-    names = list(measured.signals)
-    torques = [name for name in names if f"{name}_command" in measured.signals]
-    rates = [n for n in names if n.endswith("_rate") or n.startswith("rate_")]
-    vectors = [n for n in names if n[:3] in ("s2_", "s3_")]
-    angles = [n for n in names if f"{n}_rate" in measured.signals]
-    places, what = (vectors, "Directions") if vectors else (angles, "Joint angles")
-    return (
-        _curves(what, places, measured),
-        _curves("Rates", rates, measured),
-        _curves("Torques", torques, measured),
-        _difference(places, measured),
-    )
+    found = families(measured)
+    curves = (_curves(title, names, measured) for title, names in found.items())
+    return (*curves, _difference(next(iter(found.values())), measured))
 
 
 def _curves(title: str, names: Sequence[str], measured: Trajectory) -> Panel:
@@ -41,19 +33,18 @@ def _curves(title: str, names: Sequence[str], measured: Trajectory) -> Panel:
         peak = max((float(np.abs(flights[1][n]).max()) for n in names), default=0.0)
         scale, letter = prefix(peak)
         for k, name in enumerate(names[:_SHOWN]):
-            color = BOOMS[k % len(BOOMS)]
             if name in flights[0].signals:
                 look = {"color": PLANTS[0][1], "linewidth": 3.2, "alpha": 0.45}
                 axes.plot(flights[0].time, flights[0][name] / scale, **look)
             dashes = ("-", "--")[k // len(BOOMS)]
-            look = {"color": color, "linewidth": 1.2, "linestyle": dashes}
-            axes.plot(
-                flights[1].time, flights[1][name] / scale, label=name.replace("_", " "), **look
-            )
-        axes.set_xlim(flights[1].time[0], flights[1].time[-1])
+            look = {"color": BOOMS[k % len(BOOMS)], "linewidth": 1.2, "linestyle": dashes}
+            values = flights[1][name] / scale
+            label = None if zoom else name.replace("_", " ")  # the panel above has the key
+            axes.plot(flights[1].time, values, label=label, **look)
+        time_axis(axes, flights[1].time[0], flights[1].time[-1])
         unit = "N m" if title == "Torques" else measured.units[names[0]] if names else ""
-        words = f"{title}, {WHEN[zoom]}; time in s"
-        panel(axes, words, "", f"{letter}{unit}" or "component", below=True)
+        more = f"; {_SHOWN} of {len(names)}" if len(names) > _SHOWN else ""
+        panel(axes, f"{title}{f', {letter}{unit}' if unit else ''}{more}", below=True)
 
     return draw
 
@@ -65,12 +56,12 @@ def _difference(names: Sequence[str], measured: Trajectory) -> Panel:
         predicted, flown = flights
         time, i, j = np.intersect1d(predicted.time, flown.time, return_indices=True)
         for k, name in enumerate(n for n in names[:_SHOWN] if n in predicted.signals):
-            gap = np.maximum(np.abs(flown[name][j] - predicted[name][i]), 1e-17)
-            axes.semilogy(
-                time, gap, color=BOOMS[k % len(BOOMS)], linewidth=1.0, label=name.replace("_", " ")
-            )
+            gap = np.maximum(np.abs(flown[name][j] - predicted[name][i]), _LEAST)
+            look = {"color": BOOMS[k % len(BOOMS)], "linewidth": 1.0}
+            label = None if zoom else name.replace("_", " ")
+            axes.semilogy(time, gap, label=label, **look)
+        time_axis(axes, flown.time[0], flown.time[-1])
         unit = measured.units[names[0]] if names else ""
-        words = f"MuJoCo minus reduced, {WHEN[zoom]}; time in s"
-        panel(axes, words, "", f"|difference|, {unit or '1'}", below=True)
+        panel(axes, f"MuJoCo minus reduced{', ' if unit else ''}{unit}", below=True)
 
     return draw

@@ -45,7 +45,11 @@
 
   const PREFIXES = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
   function prefix(unit, peak) {
-    if (!/^[a-zA-Z]/.test(unit) || !(peak > 0)) return [1, unit];
+    if (!(peak > 0)) return [1, unit];
+    if (!/^[a-zA-Z]/.test(unit)) { // no prefix: a power of ten, where the numbers would be long
+      const power = peak < 1e-3 || peak >= 1e6 ? Math.floor(Math.log10(peak)) : 0;
+      return [10 ** power, power ? `1e${power}` : unit];
+    }
     const found = PREFIXES.find(([s]) => peak >= 0.5 * s);
     if (found && peak < 1e6) return [found[0], found[1] + unit];
     const power = Math.floor(Math.log10(peak));
@@ -65,6 +69,7 @@
   const short = (v, digits = 4) =>
     Number.isFinite(v) ? String(Number(v.toPrecision(digits))).replace("-", "−") : "–";
   function amount(v, unit) {
+    if (!unit) return short(v);
     const [scale, name] = prefix(unit, Math.abs(v));
     return `${short(v / scale)} ${name}`;
   }

@@ -4,10 +4,11 @@ import json
 from html import escape
 from pathlib import Path
 
-from spacecraft_sim import explain, report_figures, report_tables
+from spacecraft_sim import explain, report_columns, report_figures, report_tables
 from spacecraft_sim.chart import charts_of
 from spacecraft_sim.compare import Comparison
 from spacecraft_sim.drawing import Drawing
+from spacecraft_sim.families import is_quasi_rigid
 from spacecraft_sim.mission import Mission
 from spacecraft_sim.trajectory import Trajectory
 
@@ -74,7 +75,7 @@ def write(
         for name in ("report.js", "report_kinds.js")
     )
     text = (
-        f"{head(mission.scenario.title)}<body>\n{_header(mission, comparison)}"
+        f"{head(mission.scenario.title)}<body>\n{_header(mission, comparison, predicted)}"
         f'<nav><div>{links}<button class="theme">light / dark</button></div></nav>\n'
         f"<main>\n{body}</main>\n"
         f'<script type="application/json" id="flight-data">{data}</script>\n'
@@ -108,16 +109,17 @@ def tally(kept: int, claims: int) -> str:
     return f"{kept} of {claims} claims hold" if claims != 1 else f"{kept} of 1 claim holds"
 
 
-def _header(mission: Mission, comparison: Comparison) -> str:
+def _header(mission: Mission, comparison: Comparison, predicted: Trajectory) -> str:
     scenario, verdicts = mission.scenario, comparison.verdicts
     modes = scenario.reduced.modes
+    elastic = f", {modes} mode{'s' * (modes != 1)}" if is_quasi_rigid(predicted) else ""
     kept = sum(v.holds for v in verdicts)
     facts = {
         "scenario": scenario.name,
         "spacecraft": mission.machine.name,
         "law": str(scenario.controller["law"]),
         "flight": f"{scenario.duration:g} s",
-        "reduced model": f"{scenario.reduced.source}, {modes} mode{'s' * (modes != 1)}",
+        "reduced model": scenario.reduced.source + elastic,
         "seed": str(scenario.seed),
     }
     words = "".join(f"<span>{name} <b>{escape(text)}</b></span>" for name, text in facts.items())
@@ -130,11 +132,11 @@ def _header(mission: Mission, comparison: Comparison) -> str:
     )
 
 
-def _figure(figure: report_figures.Figure) -> str:
+def _figure(figure: report_columns.Figure) -> str:
     return f'<figure data-figure="{figure["id"]}"></figure>'
 
 
-def _flight(figures: report_figures.Figure) -> str:
+def _flight(figures: report_columns.Figure) -> str:
     own = [f for f in figures["figures"] if not f["id"].startswith(_MAPS)]
     beside = "".join(_figure(f) for f in own if f["kind"] in ("plane", "craft"))
     over_time = "".join(_figure(f) for f in own if f["kind"] not in ("plane", "craft"))
@@ -142,7 +144,7 @@ def _flight(figures: report_figures.Figure) -> str:
         f'<button data-span="{start!r} {end!r}">{name}</button>'
         for name, (start, end) in figures["spans"].items()
     )
-    rows, limit = figures["rows"], report_figures.LIMIT
+    rows, limit = figures["rows"], report_columns.LIMIT
     kept = (
         f"Every one of the {rows} rows of the MuJoCo flight is here"
         if rows <= limit
@@ -159,7 +161,7 @@ def _flight(figures: report_figures.Figure) -> str:
     )
 
 
-def _charts(figures: report_figures.Figure) -> str:
+def _charts(figures: report_columns.Figure) -> str:
     drawn = [_figure(f) for f in figures["figures"] if f["id"].startswith(_MAPS)]
     return f'<div class="charts">{"".join(drawn)}</div>' if drawn else ""
 

@@ -1,27 +1,19 @@
-"""A flight as figures in plain data, which the page of `report` draws: JSON and packed columns.
+"""A flight as figures in plain data, which the page of `report` draws: JSON and packed columns."""
 
-A curve of more than `LIMIT` points is thinned: of each group of rows the least and the largest are
-kept. Thrust is never thinned: rows at which nothing changes say nothing.
-"""
-
-import base64
-import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from spacecraft_sim import sketch, spans
-from spacecraft_sim.chart import Charts, Map, Portrait, half_width, locked, pulses, worst_to_come
-from spacecraft_sim.drawing import Drawing, channel_units
+from spacecraft_sim import report_charts, report_columns, sketch, spans
+from spacecraft_sim.chart import Charts
+from spacecraft_sim.drawing import Drawing, channel_units, turned
+from spacecraft_sim.families import families, is_quasi_rigid
 from spacecraft_sim.guarantee import Verdict
+from spacecraft_sim.report_columns import Columns, Figure, curve, plane, steps, track
 from spacecraft_sim.trajectory import Trajectory, moving_axes
 
-Array = np.ndarray
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
-Figure = dict[str, Any]
 
-LIMIT = 24_000  # points of a curve
 FRAMES = 500  # instants at which the spacecraft itself is kept
 PLANTS = (("reduced", 3.4), ("MuJoCo", 1.2))  # the thin over the wide line
 HISTORIES = {
@@ -32,31 +24,6 @@ HISTORIES = {
     "quasi_rigid_rate": "Quasi-rigid rate",
     "disturbance": "Disturbance torque",
 }
-
-
-class Columns:
-    """Columns of numbers, each kept once, little-endian and in base64.
-
-    Attributes:
-        packed: Type and data by key.
-    """
-
-    def __init__(self):
-        self.packed: dict[str, dict[str, str]] = {}
-        self._keys: dict[bytes, str] = {}
-
-    def add(self, values: Array, kind: str = "f4") -> str:
-        """Returns the key of a column.
-
-        Args:
-            values: The numbers.
-            kind: `f4` or `f8`; times are f8, so that switchings stay apart.
-        """
-        data = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
-        key = self._keys.setdefault(kind.encode() + data, f"c{len(self._keys)}")
-        if key not in self.packed:
-            self.packed[key] = {"type": kind, "data": base64.b64encode(data).decode()}
-        return key
 
 
 def page(
@@ -77,7 +44,11 @@ def page(
         charts: What the law draws beside its theorem.
     """
     columns, measured = Columns(), flights[1]
-    figures = [_history(columns, kind, flights, drawing, bands) for kind in HISTORIES]
+    if is_quasi_rigid(flights[0]):
+        figures = [_history(columns, kind, flights, drawing, bands) for kind in HISTORIES]
+    else:
+        figures = [_family(columns, *part, flights) for part in families(measured).items()]
+        figures.append(_difference(columns, flights))
     figures = [figure for figure in figures if figure["traces"]]
     if figures:
         figures[0]["marks"] = [
@@ -85,15 +56,13 @@ def page(
             for v in verdicts
             if v.t_worst is not None
         ]
-    if channels := channel_units(measured, drawing):
+    if is_quasi_rigid(flights[0]) and (channels := channel_units(measured, drawing)):
         figures.insert(3, _lanes(columns, channels, measured))
     figures.append(_craft(columns, drawing))
     moving = moving_axes(measured, "quasi_rigid_rate")
     axes = [a for a in moving_axes(measured, "quasi_rigid_angle") if a in moving]
     figures += [f for axis in axes for f in _phase_plane(columns, axis, flights, bands)]
-    for chart in charts:
-        portrait = isinstance(chart, Portrait)
-        figures += _portrait(columns, chart, measured) if portrait else [_map(chart)]
+    figures += [f for chart in charts for f in report_charts.figures(columns, chart, measured)]
     start, end = float(measured.time[0]), float(measured.time[-1])
     return {
         "start": start,
@@ -107,36 +76,6 @@ def page(
         "figures": figures,
         "columns": columns.packed,
     }
-
-
-def extremes(values: Array, limit: int) -> Array:
-    """Returns rows that keep the least and the largest value of each group, and both ends.
-
-    Args:
-        values: Samples, shape (n,).
-        limit: How many rows to keep at most, about; all are kept if there are no more.
-    """
-    n = len(values)
-    if n <= limit:
-        return np.arange(n)
-    size = -(-2 * n // limit)
-    whole = n // size * size
-    groups = values[:whole].reshape(-1, size)
-    first = np.arange(0, whole, size)
-    rows = [first + groups.argmin(axis=1), first + groups.argmax(axis=1), np.arange(whole, n)]
-    return np.unique(np.concatenate([[0], *rows, [n - 1]]))
-
-
-def _curve(columns: Columns, time: Array, values: Array) -> dict[str, str]:
-    rows = extremes(values, LIMIT)
-    return {"t": columns.add(time[rows], "f8"), "y": columns.add(values[rows])}
-
-
-def _steps(columns: Columns, time: Array, values: Array) -> dict[str, str]:
-    """Only the rows at which a value that holds changes, and the last."""
-    rows = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
-    rows = np.unique(np.append(rows, len(values) - 1))
-    return {"t": columns.add(time[rows], "f8"), "y": columns.add(values[rows])}
 
 
 def _history(
@@ -156,10 +95,40 @@ def _history(
             if kind == "tips":  # booms often swing alike: the later ones are thinner
                 tone, width = tone if full else "z-reduced", max(2.8 - 0.9 * k, 1) if full else 4.5
             trace = {"name": f"{name}, {plant}", "tone": tone, "width": width, "draw": "line"}
-            traces.append({**trace, **_curve(columns, flight.time, flight[signal])})
+            traces.append({**trace, **curve(columns, flight.time, flight[signal])})
     unit = "N m" if kind == "disturbance" else unit
     figure = {"id": kind, "kind": "history", "title": HISTORIES[kind], "unit": unit}
     return {**figure, "traces": traces, "bands": _bands(kind, bands)}
+
+
+def _family(columns: Columns, title: str, names: Sequence[str], flights: Flights) -> Figure:
+    """Signals that belong together, the reduced plant wide below."""
+    traces = []
+    for k, name in enumerate(names):
+        look = {"name": "reduced", "tone": "z-reduced", "width": 3.4, "draw": "line"}
+        if name in flights[0].signals:
+            traces.append({**look, **curve(columns, flights[0].time, flights[0][name])})
+        look = {"name": name.replace("_", " "), "tone": f"boom-{k % 5}", "width": 1.4}
+        dashed = {"draw": "line", "dashed": k >= 5}
+        traces.append({**look, **dashed, **curve(columns, flights[1].time, flights[1][name])})
+    unit = "N m" if title == "Torques" else flights[1].units[names[0]] if names else ""
+    figure = {"id": title.lower().replace(" ", "_"), "kind": "history", "title": title}
+    return {**figure, "unit": unit, "traces": traces, "bands": []}
+
+
+def _difference(columns: Columns, flights: Flights) -> Figure:
+    """MuJoCo minus the reduced plant, where both have rows."""
+    names = next(iter(families(flights[1]).values()))
+    time, i, j = np.intersect1d(flights[0].time, flights[1].time, return_indices=True)
+    traces = []
+    for k, name in enumerate(n for n in names if n in flights[0].signals):
+        look = {"name": name.replace("_", " "), "tone": f"boom-{k % 5}", "width": 1.4}
+        values = flights[1][name][j] - flights[0][name][i]
+        more = {"draw": "line", "dashed": k >= 5, **curve(columns, time, values)}
+        traces.append({**look, **more})
+    unit = flights[1].units[names[0]] if names else ""
+    figure = {"id": "difference", "kind": "history", "title": "MuJoCo minus reduced"}
+    return {**figure, "unit": unit, "traces": traces, "bands": []}
 
 
 def _bands(kind: str, bands: Mapping[str, float]) -> list[Figure]:
@@ -193,8 +162,8 @@ def _lanes(columns: Columns, channels: dict[str, str], measured: Trajectory) -> 
                 "name": channel,
                 "unit": unit,
                 "levels": np.unique(np.abs(thrust[thrust != 0])).tolist(),
-                "delivered": _steps(columns, time, thrust),
-                "command": _steps(columns, time, measured[f"{channel}_command"]),
+                "delivered": steps(columns, time, thrust),
+                "command": steps(columns, time, measured[f"{channel}_command"]),
             }
         )
         if len(lanes[-1]["levels"]) > 16:  # a thrust that rises and falls has no levels
@@ -214,39 +183,36 @@ def _craft(columns: Columns, drawing: Drawing) -> Figure:
         rgb = [round(255 * float(c)) for c in shape.rgba[:3]]
         part = {"points": points.round(4).tolist(), "rgb": rgb, "faces": faces}
         bodies.setdefault(shape.body, []).append(part)
-        place = np.abs(view.project(drawing.positions[shape.body] - centre)).max(axis=0)
-        seen.append(place + np.linalg.norm(points, axis=1).max())
+        place = (drawing.positions[shape.body] - centre)[frames, None]
+        shown = place + turned(drawing.quaternions[shape.body][frames, None], points)
+        seen.append(view.project(shown).reshape(-1, 2))
     for boom, (bent, straight) in lines.items():
         shares = np.linalg.norm(straight[0] - straight[0, 0], axis=1)
         path = np.concatenate([bent[frames], straight[frames, -1:]], axis=1)
         key, shares = columns.add(path), (shares / shares[-1]).round(6).tolist()
         booms.append({"name": boom, "key": key, "shares": shares})
-        shown = view.project(straight + factor * (bent - straight))
-        seen.append(np.abs(shown).max(axis=(0, 1)))
+        shown = (straight + factor * (bent - straight))[frames]
+        seen.append(view.project(shown).reshape(-1, 2))
     poses = {
         body: np.hstack([drawing.positions[body] - centre, drawing.quaternions[body]])[frames]
         for body in bodies
     }
+    low = np.min([points.min(axis=0) for points in seen], axis=0)
+    high = np.max([points.max(axis=0) for points in seen], axis=0)
     return {
         "id": "craft",
         "kind": "craft",
-        "title": "Spacecraft at the cursor",
+        "title": "At the cursor",
         "seen": view.words,
         "axes": [view.right.tolist(), view.up.tolist(), view.near.tolist()],
-        "reach": (2 * np.max(seen, axis=0)).tolist(),
+        "middle": ((low + high) / 2).tolist(),
+        "reach": (high - low).tolist(),
         "factor": factor,
         "factors": sorted({1.0, 2.0, 5.0, 10.0, factor}) if booms else [],
         "t": columns.add(drawing.time[frames], "f8"),
         "bodies": [{"key": columns.add(poses[b]), "shapes": parts} for b, parts in bodies.items()],
         "booms": booms,
     }
-
-
-def _track(columns: Columns, time: Array, x: Array, y: Array) -> dict[str, str]:
-    rows = np.union1d(extremes(x, LIMIT // 2), extremes(y, LIMIT // 2))
-    rows = rows if len(x) > LIMIT else np.arange(len(x))
-    pair = {"x": columns.add(x[rows]), "y": columns.add(y[rows])}
-    return {"t": columns.add(time[rows], "f8"), **pair}
 
 
 def _phase_plane(
@@ -258,105 +224,19 @@ def _phase_plane(
     tracks = []
     for flight, (plant, width) in zip(flights, PLANTS, strict=True):
         look = {"name": plant, "tone": f"{axis}-{plant.lower()}", "width": width}
-        track = _track(columns, flight.time, flight[names[0]], flight[names[1]])
-        tracks.append({**look, **track, "dotted": plant == "MuJoCo"})
+        data = track(columns, flight.time, flight[names[0]], flight[names[1]])
+        tracks.append({**look, **data, "dotted": plant == "MuJoCo"})
     x = {"name": f"quasi-rigid angle {axis}", "unit": "rad"}
     y = {"name": f"quasi-rigid rate {axis}", "unit": "rad/s"}
     half = bands.get(names[0])
     band = [{"low": -half, "high": half, "name": f"±{half:.3g} rad"}] if half else []
     title = f"Phase plane {axis}" if axis != "z" else "Phase plane"
-    figure = _plane(f"phase_{axis}", f"{title}, of the time shown", x, y)
-    return [{**figure, "tracks": tracks, "bands": band, "smooth": len(flights[1].time) <= LIMIT}]
-
-
-def _plane(name: str, title: str, x: Figure, y: Figure) -> Figure:
-    parts = {part: [] for part in ("regions", "lines", "tracks", "bands", "points")}
-    return {"id": name, "kind": "plane", "title": title, "x": x, "y": y, "window": None, **parts}
-
-
-def _outlines(chart: Portrait | Map) -> Figure:
-    looks = {
-        "bound": {"tone": "good", "width": 2.2, "dashed": False},
-        "switching": {"tone": "switching", "width": 1.6, "dashed": True},
-        "aid": {"tone": "soft", "width": 0.9, "dashed": False},
-    }
-    return {
-        "regions": [
-            {"name": r.name, "tone": f"region-{k % 4}", "points": _points(r.outline)}
-            for k, r in enumerate(chart.regions)
-        ],
-        "lines": [
-            {"name": line.name, **looks[line.look], "points": _points(line.points)}
-            for line in chart.lines
-        ],
-    }
-
-
-def _points(points: Array) -> list[list[float | None]]:
-    """JSON has no NaN, which breaks a line: null."""
-    return [[None, None] if math.isnan(x + y) else [x, y] for x, y in points.tolist()]
-
-
-def _portrait(columns: Columns, portrait: Portrait, measured: Trajectory) -> list[Figure]:
-    """The phase plane of a law, the angle in its band, the lengths of the pulses."""
-    time, (x, y) = measured.time, (measured[name] for name in portrait.signals)
-    names = [name.replace("_", " ") for name in portrait.signals]
-    units = [measured.units[name] for name in portrait.signals]
-    labels = [{"name": n, "unit": u} for n, u in zip(names, units, strict=True)]
-    look = {"name": "flight", "tone": "z-mujoco", "width": 1.1, "dotted": True}
-    tracks = [{**look, **_track(columns, time, x, y)}]
-    if portrait.min_on_time:
-        on = locked(measured, portrait)
-        rows = np.flatnonzero(on | np.r_[False, on[:-1]])  # with a row after each, which ends it
-        look = {"name": "minimum on-time running", "tone": "bad", "width": 2.2}
-        data = {"x": np.where(on, x, np.nan)[rows], "y": y[rows]}
-        packed = {name: columns.add(values) for name, values in data.items()}
-        tracks.append({**look, **packed, "t": columns.add(time[rows], "f8")})
-    half = [half_width(portrait, k) for k in (0, 1)]
-    window = [-half[0], half[0], -half[1], half[1]] if all(half) else None
-    plane = _plane(f"chart_{portrait.name}", portrait.title, *labels)
-    smooth = len(time) <= LIMIT
-    plane |= {"tracks": tracks, "window": window, "smooth": smooth, **_outlines(portrait)}
-    band = portrait.band
-    still = {"name": "largest still to come", "tone": "bad", "width": 1.3, "draw": "line"}
-    inside = {
-        **{"id": f"band_{portrait.name}", "kind": "history", "unit": units[0]},
-        "title": f"{names[0].capitalize()} in its band",
-        "traces": [
-            {"name": "flight", "tone": "z-mujoco", "width": 1.2, "draw": "line"}
-            | _curve(columns, time, x),
-            still | _curve(columns, time, worst_to_come(x)),
-        ],
-        "bands": [{"low": -band, "high": band, "name": "guaranteed"}] if band else [],
-    }
-    return [plane, inside, _pulses(columns, portrait, measured)]
-
-
-def _pulses(columns: Columns, portrait: Portrait, measured: Trajectory) -> Figure:
-    thrust, least = measured[portrait.channel], portrait.min_on_time
-    start, length = pulses(measured.time, thrust)
-    positive = thrust[np.searchsorted(measured.time, start)] > 0
-    traces = []
-    for mask, tone, word in ((positive, "plus", "positive"), (~positive, "minus", "negative")):
-        if mask.any():
-            look = {"name": f"{word} pulse", "tone": tone, "width": 1.4, "draw": "stem"}
-            data = {"t": columns.add(start[mask], "f8"), "y": columns.add(length[mask])}
-            traces.append({**look, **data})
-    limit = {"low": least, "high": least, "faint": True, "name": f"minimum on-time {least:g} s"}
-    shortest = f", the shortest {length.min():.6g} s" if len(length) else ""
-    figure = {"id": f"pulses_{portrait.name}", "kind": "history", "unit": "s", "floor": 0.0}
-    figure["title"] = f"{len(length)} pulses{shortest}"
-    return {**figure, "traces": traces, "bands": [limit] if least else []}
-
-
-def _map(chart: Map) -> Figure:
-    x, y = ({"name": label, "unit": ""} for label in chart.labels)
-    outlines = _outlines(chart)
-    drawn = [*(line.points for line in chart.lines), *(r.outline for r in chart.regions)]
-    points = np.vstack([np.array([chart.point]), *drawn])
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
-    pad = 0.03 * np.where(high > low, high - low, 1.0)
-    window = [low[0] - pad[0], high[0] + pad[0], low[1] - pad[1], high[1] + pad[1]]
-    here = [{"x": chart.point[0], "y": chart.point[1], "name": "here"}]
-    figure = _plane(f"chart_{chart.name}", chart.title, x, y)
-    return {**figure, **outlines, "points": here, "window": [float(v) for v in window]}
+    figure = plane(f"phase_{axis}", f"{title}, of the time shown", x, y)
+    return [
+        {
+            **figure,
+            "tracks": tracks,
+            "bands": band,
+            "smooth": len(flights[1].time) <= report_columns.LIMIT,
+        }
+    ]

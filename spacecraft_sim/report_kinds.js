@@ -23,9 +23,14 @@
   kinds.history = (spec) => {
     const shape = frame(spec, 176);
     let X, inverse, fit = false;
+    const keys = {}; // curves of one name share a key, which then reads out none
     const traces = spec.traces.map((trace) => {
-      const look = key(shape.caption, trace.name, trace.tone, trace.dashed ? "dashed" : "", draw);
-      const value = element("span", trace.draw === "stem" ? {} : { class: "value" }, look.found);
+      const shared = spec.traces.filter(({ name }) => name === trace.name).length > 1;
+      const look = keys[trace.name]
+        ?? key(shape.caption, trace.name, trace.tone, trace.dashed ? "dashed" : "", draw);
+      keys[trace.name] = look;
+      const plain = shared || trace.draw === "stem";
+      const value = element("span", plain ? {} : { class: "value" }, plain ? null : look.found);
       const path = element("path", { class: "trace", "data-name": trace.name,
         style: `--c: var(--${trace.tone})`, "stroke-width": trace.width }, shape.inside);
       if (trace.dashed) path.setAttribute("stroke-dasharray", "5 4");
@@ -339,7 +344,8 @@
       const outlines = [];
       const middle = [shape.width / 2, shape.height / 2];
       const scale = 0.94 * Math.min(shape.width / spec.reach[0], shape.height / spec.reach[1]);
-      const project = (p) => [middle[0] + scale * dot(p, right), middle[1] - scale * dot(p, up)];
+      const project = (p) => [middle[0] + scale * (dot(p, right) - spec.middle[0]),
+        middle[1] - scale * (dot(p, up) - spec.middle[1])];
       choose.textContent = `bending × ${factor}`;
       shape.back.replaceChildren();
       for (const { key: poses, shapes } of spec.bodies) {

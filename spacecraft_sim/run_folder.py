@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from spacecraft_sim import config
 from spacecraft_sim.chart import Portrait, charts_of
 from spacecraft_sim.compare import Comparison
+from spacecraft_sim.families import is_quasi_rigid
 from spacecraft_sim.guarantee import Assumption, Verdict
 from spacecraft_sim.margins import Margin, Saturation
 from spacecraft_sim.mission import Mission
@@ -149,7 +150,6 @@ def write_pictures(
 
     title, charts = mission.scenario.title, charts_of(mission.controller)
     drawn = drawing.draw(mission.mujoco.model.ptr, mission.machine, measured)
-    rigid = any(name.startswith("quasi_rigid_angle") for name in predicted.signals)
     plots.summary(
         folder / "summary.png",
         measured=measured,
@@ -158,7 +158,7 @@ def write_pictures(
         verdicts=comparison.verdicts,
         title=title,
         bands=mission.bands,
-        histories=None if rigid else plots_smooth.panels(measured),
+        histories=None if is_quasi_rigid(predicted) else plots_smooth.panels(measured),
     )
     if any(not isinstance(chart, Portrait) for chart in charts):
         plots_chart.page(folder / "charts.png", measured=measured, charts=charts, title=title)

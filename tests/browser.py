@@ -17,6 +17,7 @@ CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
 MISSING = "chromium is not installed; on Debian: apt install chromium"
+PATIENCE = 180.0  # s; a machine may be busy with other tests
 FLAGS = (
     *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
     *("--no-first-run", "--hide-scrollbars", "--mute-audio", "--remote-debugging-pipe"),
@@ -65,7 +66,7 @@ class Page:
     def close(self):
         self._session = None
         self.call("Browser.close")
-        self.process.wait(timeout=20)
+        self.process.wait(timeout=PATIENCE)
         os.close(self._write)
         os.close(self._read)
 
@@ -82,7 +83,7 @@ class Page:
         return answer["result"]
 
     def _receive(self):
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + PATIENCE
         while b"\0" not in self._rest:
             ready, _, _ = select.select([self._read], [], [], deadline - time.monotonic())
             assert ready, "the browser says nothing"
@@ -104,7 +105,7 @@ class Page:
         return found["result"].get("value")
 
     def until(self, expression):
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + PATIENCE
         while not self.evaluate(expression):
             assert time.monotonic() < deadline, expression
             time.sleep(0.02)

@@ -11,15 +11,24 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import FancyArrowPatch
 
-from spacecraft_sim import plots, plots_chart, sketch, spans
+from spacecraft_sim import plots, plots_chart, plots_smooth, sketch, spans
 from spacecraft_sim.chart import charts_of
 from spacecraft_sim.drawing import Shape, turned
+from spacecraft_sim.families import families, is_quasi_rigid
 from spacecraft_sim.trajectory import Trajectory
 
 PLANAR = ("duration=60.0",)
 TUMBLING = (*ON_AN_AXIS, *FREE, "duration=5.0")
 RIGID = (*ON_AN_AXIS, "spacecraft=rigid_bus", "reduced.source=mjcf", "reduced.modes=0",
          "initial.boom_amplitude=0.0", "duration=5.0")  # fmt: skip
+
+
+def arm():
+    return flown("duration=1.0", name="burkov-position")
+
+
+def body():
+    return flown("duration=1.0", name="burkov-body-vectors-free")
 
 
 def shape(kind, size, position=(0, 0, 0), quaternion=(1, 0, 0, 0)):
@@ -47,6 +56,9 @@ def page(tmp_path_factory):
                     verdicts=flight.comparison.verdicts,
                     title="A flight",
                     bands=flight.mission.bands,
+                    histories=None
+                    if is_quasi_rigid(flight.predicted)
+                    else plots_smooth.panels(flight.measured),
                 )
             drawn[id(flight)] = flight, kept[0], imread(path)  # the flight too: ids are used again
         return drawn[id(flight)][1:]
@@ -205,7 +217,7 @@ def test_no_key_covers_a_curve(page):
 
 
 def test_titles_stay_within_the_page_and_off_each_other(page):
-    for flight in (flown(*PLANAR), flown(*TUMBLING), flown(*RIGID)):
+    for flight in (flown(*PLANAR), flown(*TUMBLING), flown(*RIGID), arm(), body()):
         figure, _ = page(flight)
         found = [
             t for axes in figure.axes for t in (axes.title, axes._left_title, axes._right_title)
@@ -258,6 +270,27 @@ def test_commands_too_dense_to_draw_are_said_to_be(page):
     signals = {**flight.measured.signals, "thruster_z_command": fast, "thruster_z": fast}
     figure, _ = page(replace(flight, measured=replace(flight.measured, signals=signals)))
     assert any("commands too dense" in title for title in titles(figure))
+
+
+def test_arms_and_bodies_show_places_rates_and_torques(page):
+    for flight, places, unit in ((arm(), "Joint angles", ", rad"), (body(), "Directions", "")):
+        figure, _ = page(flight)
+        found = titles(figure)
+        assert sum(title.startswith(places + unit) for title in found) == 2
+        for heading in ("Rates", "Torques", "MuJoCo minus reduced"):
+            assert sum(title.startswith(heading) for title in found) == 2
+        assert not any("Thrust" in title or "Phase plane" in title for title in found)
+
+
+def test_families_name_the_signals_once():
+    assert families(arm().measured) == {
+        "Joint angles": ("joint_1", "joint_2"),
+        "Rates": ("joint_1_rate", "joint_2_rate"),
+        "Torques": ("motor_1", "motor_2"),
+    }
+    found = families(body().measured)
+    assert found["Directions"][:2] == ("s2_x", "s2_y")
+    assert found["Rates"] == ("rate_x", "rate_y", "rate_z")
 
 
 def test_a_craft_that_is_at_rest_is_said_to_be(page):

@@ -13,7 +13,7 @@ from flown import FREE, ON_AN_AXIS, flown
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spacecraft_sim import cli, report, report_figures, report_tables, run_folder
+from spacecraft_sim import cli, report, report_columns, report_figures, report_tables, run_folder
 from spacecraft_sim.chart import charts_of
 from spacecraft_sim.errata import Section, sections
 
@@ -38,7 +38,7 @@ def write(flight, path):
 def figures(flight, limit=None, monkeypatch=None):
     """The figures by name, and a function that unpacks a column."""
     if limit:
-        monkeypatch.setattr(report_figures, "LIMIT", limit)
+        monkeypatch.setattr(report_columns, "LIMIT", limit)
     page = report_figures.page(
         (flight.predicted, flight.measured),
         flight.drawing,
@@ -64,7 +64,7 @@ def figures(flight, limit=None, monkeypatch=None):
 )
 def test_thinning_keeps_ends_and_extremes_of_every_group(values, limit):
     values = np.array(values, dtype=float)
-    rows = report_figures.extremes(values, limit)
+    rows = report_columns.extremes(values, limit)
     assert np.all(np.diff(rows) > 0)
     assert rows[0] == 0
     assert rows[-1] == len(values) - 1
@@ -177,6 +177,18 @@ def test_a_machine_that_tumbles_is_seen_from_aside():
     found, _ = figures(flight)
     assert found["craft"]["seen"].startswith("isometric")
     assert len(found["attitude"]["traces"]) == 6  # three axes on two plants
+
+
+def test_an_arm_shows_joints_rates_torques_and_the_difference():
+    flight = flown("duration=1.0", name="burkov-position")
+    found, column = figures(flight)
+    assert list(found)[:4] == ["joint_angles", "rates", "torques", "difference"]
+    traces = found["joint_angles"]["traces"]
+    assert [t["name"] for t in traces] == ["reduced", "joint 1", "reduced", "joint 2"]
+    np.testing.assert_array_equal(column(traces[1]["y"]), flight.measured["joint_1"].astype("f4"))
+    gap = flight.measured["joint_2"] - flight.predicted["joint_2"]
+    np.testing.assert_allclose(column(found["difference"]["traces"][1]["y"]), gap, rtol=1e-6)
+    assert "thrust" not in found  # torques that vary all the time have no lanes
 
 
 def test_charts_of_a_law_are_there():
