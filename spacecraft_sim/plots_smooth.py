@@ -39,7 +39,8 @@ def _curves(title: str, names: Sequence[str], measured: Trajectory) -> Panel:
             dashes = ("-", "--")[k // len(BOOMS)]
             look = {"color": BOOMS[k % len(BOOMS)], "linewidth": 1.2, "linestyle": dashes}
             values = flights[1][name] / scale
-            label = None if zoom else name.replace("_", " ")  # the panel above has the key
+            words = name.removesuffix("_rate").replace("_", " ")
+            label = None if zoom else words  # the panel above has the key
             axes.plot(flights[1].time, values, label=label, **look)
         time_axis(axes, flights[1].time[0], flights[1].time[-1])
         unit = "N m" if title == "Torques" else measured.units[names[0]] if names else ""
