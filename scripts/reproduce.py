@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from spacecraft_sim import mission, record, run_folder
+from spacecraft_sim import beneath, mission, record, run_folder
 from support import efremov_figure as figure
 from support import efremov_reference as reference
 
@@ -28,8 +28,8 @@ def fly(ready: mission.Mission, folder: Path) -> None:
     figure.write(folder / "figure.png", measured, predicted, ready.scenario)
     subject = run_folder.subject(ready)
     verdicts = ready.judge(measured, predicted).verdicts
-    beneath = record.reduced(subject, predicted)
-    record.write(folder / "recording.rrd", subject, measured, beneath, verdicts)
+    below = beneath.reduced(subject, predicted)
+    record.write(folder / "recording.rrd", subject, measured, below, verdicts)
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -13,6 +13,7 @@ from spacecraft_sim.thrusters import nearest_level
 from spacecraft_sim.trajectory import Trajectory
 
 Array = np.ndarray
+SPACING = 0.02  # time between rows that are shown though nothing happens, s
 What = Literal["command", "thrust"]
 BETWEEN = ("between levels, +", "between levels, -")  # a thrust that rises or falls
 
@@ -24,10 +25,12 @@ class Channel:
     Attributes:
         thruster: The thruster.
         unit: N or N m.
+        largest: The largest thrust that is expected of it, N or N m.
     """
 
     thruster: Thruster
     unit: str
+    largest: float
 
     @property
     def name(self) -> str:
@@ -131,6 +134,29 @@ def changes(
                 )
             )
     return found
+
+
+def rows_to_show(
+    part: Trajectory, channels: Sequence[Channel], before: Mapping[str, float]
+) -> Array:
+    """Returns which rows a plot needs: one a `SPACING`, and all at which a relay acts.
+
+    Args:
+        part: A part of a flight, at least one row.
+        channels: The channels.
+        before: Time and signals of the last row that was shown; empty at the start of a flight.
+
+    Returns:
+        Truth values, shape (n,).
+    """
+    place = np.floor(np.r_[before.get("time", -1.0), part.time] / SPACING + 1e-6)
+    chosen = np.diff(place) > 0
+    for channel in channels:
+        if not channel.thruster.proportional:
+            for what in ("command", "thrust"):
+                signal = channel.signal(what)
+                chosen |= np.diff(part[signal], prepend=before.get(signal, math.nan)) != 0
+    return chosen
 
 
 def _change(old: float, new: float) -> str:

@@ -175,12 +175,12 @@ def _run(arguments: argparse.Namespace) -> int:
     address = viewer.spawn() if arguments.spawn else viewer.found(arguments.connect)
     folder = run_folder.create(arguments.out, mission.scenario.name)
     try:
-        from spacecraft_sim import record
+        from spacecraft_sim import beneath, record
 
         subject = run_folder.subject(mission)
         with record.Recording(subject, folder / "recording.rrd", address) as recording:
             predicted = _fly(mission, "reduced")
-            recording.expect(record.reduced(subject, predicted, factor))
+            recording.expect(beneath.reduced(subject, predicted, factor))
             measured = _fly(mission, "mujoco", recording.take)
             run_folder.write_flights(folder, mission.scenario, measured, predicted)
             for flight in (measured, predicted):

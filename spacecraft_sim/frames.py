@@ -1,13 +1,13 @@
 """What is drawn of a flight at its instants: poses of bodies, booms bent more than they are.
 
-The full plant knows where each body is.  The reduced model knows attitude and boom tips alone: its
-ghost has the bus in that attitude, at the place of the other plant's bus, and each boom in the
-shape of the first cantilever mode through its tip, which is exact for the Galerkin model of one
-mode.
+The full plant knows where each body is.  What the reduced plant knows decides how its ghost is
+drawn: if it reads every joint, as an arm's equations of motion do, whole; otherwise the bus in its
+attitude, at the place of the other plant's bus, and each boom in the shape of the first cantilever
+mode through its tip, which is exact for the Galerkin model of one mode.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from spacecraft_sim.trajectory import Trajectory, selected
 
 Array = np.ndarray
 
-SPACING = 0.1  # least time between two frames, s
+SPACING = 0.1  # time between two frames, s, of which a flight has MANY at least
+MANY = 1000
 FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 POINTS = 9  # of the ghost's booms
 
@@ -52,27 +53,48 @@ def at_rest(model, machine: Spacecraft) -> Drawing:
     return draw(model, machine, Trajectory(time=np.zeros(1), signals=signals, units={}))
 
 
-def thinned(part: Trajectory) -> Trajectory:
-    """Returns the rows that become frames: first and last, and one a `SPACING` between.
+def drawn_bodies(rest: Drawing) -> list[str]:
+    """Returns the bodies that are drawn as solids or carry jets: all but the links of booms.
+
+    Args:
+        rest: The machine in its reference configuration.
+    """
+    links = {body for bodies in rest.booms.values() for body in bodies}
+    links |= {f"{boom}_tip_mass" for boom in rest.booms}
+    carriers = {jet.body for jet in rest.jets}
+    return [body for body in rest.positions if body not in links or body in carriers]
+
+
+def spacing(flight: Trajectory) -> float:
+    """Returns the time between two frames of a flight, s.
+
+    Args:
+        flight: The flight.
+    """
+    return min(SPACING, float(flight.time[-1]) / MANY) or SPACING
+
+
+def thinned(part: Trajectory, every: float) -> Trajectory:
+    """Returns the rows that become frames: the first, the last, and one at times between.
 
     Args:
         part: A part of a flight.
+        every: Time between two frames, s.
     """
-    place = np.floor(part.time / SPACING + 1e-6)
+    place = np.floor(part.time / every + 1e-6)
     rows = np.flatnonzero(np.r_[True, np.diff(place) > 0])
     return selected(part, np.union1d(rows, [len(part.time) - 1]))
 
 
 def simulated(model, machine: Spacecraft, part: Trajectory, factor: float) -> Frames:
-    """Draws a part of a flight of the full plant.
+    """Draws the rows of a flight of the full plant.
 
     Args:
         model: The compiled spacecraft.
         machine: The machine.
-        part: The part.
+        part: The rows, with the machine's coordinates as their last signals.
         factor: How many times too far the booms are bent.
     """
-    part = thinned(part)
     drawing = draw(model, machine, part, frames=len(part.time))
     booms = {}
     for boom in drawing.booms:
@@ -86,74 +108,78 @@ def simulated(model, machine: Spacecraft, part: Trajectory, factor: float) -> Fr
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ghost:
-    """How the reduced model is drawn beside the full plant.
+def read_joints(model, flight: Trajectory) -> list[str]:
+    """Returns the readings that are the coordinates of a machine; none if any is not read.
 
-    Attributes:
-        turn: Orientation (w, x, y, z) of the bus at attitude zero.
-        roots: Root frame of each boom in the bus frame: position, m, and quaternion.
-        lengths: Length of each boom, m.
+    Args:
+        model: The compiled spacecraft.
+        flight: A flight.
+    """
+    names = [model.joint(j).name for j in range(model.njnt)]
+    simple = model.nq == model.njnt  # hinges and slides alone
+    return names if simple and all(name in flight.signals for name in names) else []
+
+
+def posed(
+    model, machine: Spacecraft, part: Trajectory, joints: Sequence[str], factor: float
+) -> Frames:
+    """Draws the rows of a flight whose readings are all coordinates of the machine.
+
+    Args:
+        model: The compiled spacecraft.
+        machine: The machine.
+        part: The rows.
+        joints: The readings, as `read_joints` returns them.
         factor: How many times too far the booms are bent.
     """
-
-    turn: Array
-    roots: Mapping[str, tuple[Array, Array]]
-    lengths: Mapping[str, float]
-    factor: float
-
-    def frames(self, part: Trajectory, beside: Frames) -> Frames:
-        """Draws a part of a flight of the reduced model.
-
-        Args:
-            part: The part, at least one row.
-            beside: The same part of the other plant's flight, whose bus lends its place.
-        """
-        part = thinned(part)
-        turn = product(self.turn, rotation(attitude(part)))
-        place = interpolated(part.time, beside.time, beside.positions[BUS])
-        booms = {}
-        for boom, (position, quaternion) in self.roots.items():
-            names = [f"{boom}_tip_{axis}" for axis in "yz"]
-            if not all(name in part.signals for name in names):
-                continue
-            x = np.linspace(0.0, self.lengths[boom], POINTS)
-            shape = beam.mode_shape(1, x, self.lengths[boom])
-            line = np.zeros((len(part.time), POINTS, 3))
-            line[:, :, 0] = x
-            for axis, name in enumerate(names, start=1):
-                line[:, :, axis] = self.factor * np.outer(part[name], shape / shape[-1])
-            inside = position + turned(quaternion, line)
-            booms[boom] = place[:, None] + turned(turn[:, None], inside)
-        return Frames(
-            time=part.time,
-            positions={BUS: place},
-            quaternions={BUS: turn},
-            booms=booms,
-        )
+    coordinates = {name: part[name] for name in joints}
+    return simulated(model, machine, replace(part, signals=coordinates), factor)
 
 
-def ghost(
-    machine: Spacecraft, rest: Drawing, start: Frames, part: Trajectory, factor: float
-) -> Ghost:
-    """Returns how to draw the reduced model of a machine.
+def bus_alone(
+    machine: Spacecraft,
+    rest: Drawing,
+    part: Trajectory,
+    beside: Frames,
+    over: Trajectory,
+    factor: float,
+) -> Frames:
+    """Draws the rows of a flight from the attitude of the bus and the tips of the booms.
 
     Args:
         machine: The machine.
         rest: The machine in its reference configuration.
-        start: First frames of the full plant.
-        part: The rows of its flight that they were drawn from.
+        part: The rows, at least one.
+        beside: The same part of the other plant's flight, whose bus lends its place.
+        over: The rows that it was drawn from.
         factor: How many times too far the booms are bent.
     """
-    inverse = rest.quaternions[BUS][0] * (1, -1, -1, -1)
-    roots = {}
-    for boom, (root, *_) in rest.booms.items():
-        arm = rest.positions[root][0] - rest.positions[BUS][0]
-        roots[boom] = turned(inverse, arm), product(inverse, rest.quaternions[root][0])
-    # Whether a sensor counts from the reference configuration or from the world: take it back.
-    turn = product(start.quaternions[BUS][0], rotation(-attitude(part)[0]))
-    lengths = {boom.name: boom.length for boom in machine.booms}
-    return Ghost(turn=turn, roots=roots, lengths=lengths, factor=factor)
+    # Whether a sensor counts from the world or the reference configuration, from the body or its
+    # principal axes: the other plant's first frame says.
+    read, first = orientation(part), orientation(selected(over, slice(1)))
+    if "attitude" in read:
+        back = product(beside.quaternions[BUS][:1], inverse(first["attitude"]))
+        turn = product(back, read["attitude"])
+    else:
+        forth = product(inverse(first["directions"]), beside.quaternions[BUS][:1])
+        turn = product(read["directions"], forth)
+    place = interpolated(part.time, beside.time, beside.positions[BUS])
+    back, booms = inverse(rest.quaternions[BUS][0]), {}
+    for boom in machine.booms:
+        tips = [f"{boom.name}_tip_{axis}" for axis in "yz"]
+        if not all(name in part.signals for name in tips):
+            continue
+        x = np.linspace(0.0, boom.length, POINTS)
+        shape = beam.mode_shape(1, x, boom.length)
+        line = np.zeros((len(part.time), POINTS, 3))
+        line[:, :, 0] = x
+        for axis, name in enumerate(tips, start=1):
+            line[:, :, axis] = factor * np.outer(part[name], shape / shape[-1])
+        root = rest.booms[boom.name][0]
+        arm = turned(back, rest.positions[root][0] - rest.positions[BUS][0])
+        inside = arm + turned(product(back, rest.quaternions[root][0]), line)
+        booms[boom.name] = place[:, None] + turned(turn[:, None], inside)
+    return Frames(time=part.time, positions={BUS: place}, quaternions={BUS: turn}, booms=booms)
 
 
 def suited_factor(flight: Trajectory, lengths: Mapping[str, float]) -> float:
@@ -173,14 +199,53 @@ def suited_factor(flight: Trajectory, lengths: Mapping[str, float]) -> float:
     return max(f for f in FACTORS if f == 1 or f < 0.3 / largest)
 
 
-def attitude(part: Trajectory) -> Array:
-    """Returns the attitude as rotation vectors, shape (n, 3), rad; zero about axes not recorded.
+def orientation(part: Trajectory) -> dict[str, Array]:
+    """Returns what the readings say of the orientation of the bus, as quaternions (w, x, y, z).
 
     Args:
         part: A part of a flight.
+
+    Returns:
+        `attitude`, from angles about axes (none recorded: zero), and `directions`, from fixed
+        directions in the body; each of shape (n, 4), and only if there are such readings.
     """
-    still = np.zeros(len(part.time))
-    return np.stack([part.signals.get(f"attitude_{axis}", still) for axis in "xyz"], axis=-1)
+    found, still = {}, np.zeros(len(part.time))
+    if any(f"attitude_{axis}" in part.signals for axis in "xyz"):
+        vector = [part.signals.get(f"attitude_{axis}", still) for axis in "xyz"]
+        found["attitude"] = rotation(np.stack(vector, axis=-1))
+    names = [[f"s{row}_{axis}" for axis in "xyz"] for row in (1, 2, 3)]
+    if all(name in part.signals for row in names for name in row):
+        matrix = np.array([[part[name] for name in row] for row in names])
+        found["directions"] = of_matrix(np.moveaxis(matrix, -1, 0))
+    return found
+
+
+def of_matrix(matrix: Array) -> Array:
+    """Returns the quaternions (w, x, y, z) of rotation matrices.
+
+    Args:
+        matrix: Shape (n, 3, 3).
+    """
+    # 4 q q^T from the matrix; its column with the largest diagonal is q but for its size.
+    products = np.zeros((len(matrix), 4, 4))
+    diagonal = matrix[:, range(3), range(3)]
+    products[:, 0, 0] = 1 + diagonal.sum(axis=1)
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1)), start=1):
+        products[:, i, i] = 1 + 2 * diagonal[:, i - 1] - diagonal.sum(axis=1)
+        products[:, 0, i] = products[:, i, 0] = matrix[:, k, j] - matrix[:, j, k]
+        products[:, j + 1, k + 1] = products[:, k + 1, j + 1] = matrix[:, k, j] + matrix[:, j, k]
+    best = np.argmax(products[:, range(4), range(4)], axis=1)
+    found = products[range(len(matrix)), best]
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def inverse(q: Array) -> Array:
+    """Returns the quaternions (w, x, y, z) that turn back.
+
+    Args:
+        q: Shape (..., 4), of unit length.
+    """
+    return q * (1, -1, -1, -1)
 
 
 def rotation(vector: Array) -> Array:

@@ -5,136 +5,27 @@ beforehand, of the reduced model or of another run; it says how large everything
 calls write a file, an open viewer, or both, in chunks; after each the file reads up to there.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 from uuid import uuid4
 
 import rerun as rr
 
 from spacecraft_sim import record_chart, record_scene, record_signals, record_text
-from spacecraft_sim.changes import Channel, changes
-from spacecraft_sim.chart import Charts
-from spacecraft_sim.drawing import Drawing, channel_units
-from spacecraft_sim.frames import Frames, at_rest, ghost, simulated, suited_factor
+from spacecraft_sim.beneath import Beneath, Subject, channels
+from spacecraft_sim.changes import Channel, changes, rows_to_show
+from spacecraft_sim.frames import at_rest, drawn_bodies, simulated, spacing, thinned
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.mjcf import BUS
 from spacecraft_sim.record_layout import Layout, blueprint
-from spacecraft_sim.spacecraft import Spacecraft
+from spacecraft_sim.signal_groups import groups
 from spacecraft_sim.trajectory import Trajectory, selected
 
 APPLICATION = "spacecraft_sim"
 PATIENCE = 5.0  # how long a viewer may take for a chunk before the run goes on without it, s
 CHUNK = 1000  # rows of a flight that is over
 PLUME = 0.25  # longest plume, in sizes of the spacecraft
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Subject:
-    """What a recording is about.
-
-    Attributes:
-        title: Name of the recording.
-        scenario: The scenario, as TOML.
-        model: The compiled spacecraft.
-        machine: The spacecraft.
-        band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
-        charts: What the law draws beside its theorem.
-    """
-
-    title: str
-    scenario: str
-    model: Any
-    machine: Spacecraft
-    band: float | None = None
-    charts: Charts = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Beneath:
-    """The flight that lies beneath the other, drawn as a ghost.
-
-    Attributes:
-        flight: The flight.
-        known: Flights that are known beforehand: this one, and the other one if it is over.
-        key: Its name in paths; in alphabetical order before that of the other.
-        name: Its name in keys.
-        over_key: Name of the other flight in paths.
-        over_name: Name of the other flight in keys.
-        rest: Its machine in the reference configuration.
-        bodies: The bodies that are drawn; the first carries the booms.
-        frames: Draws a part of it, given its rows, the frames and the rows of the other flight.
-        factor: How many times too far all booms are bent.
-        channels: Channels that get lanes of their own.
-        notes: What is to be said of the recording.
-    """
-
-    flight: Trajectory
-    known: Sequence[Trajectory]
-    key: str
-    name: str
-    over_key: str
-    over_name: str
-    rest: Drawing
-    bodies: Sequence[str]
-    frames: Callable[[Trajectory, Frames, Trajectory], Frames]
-    factor: float
-    channels: Sequence[Channel] = ()
-    notes: tuple[str, ...] = ()
-
-
-def reduced(subject: Subject, flight: Trajectory, factor: float | None = None) -> Beneath:
-    """Returns the flight of the reduced model as the one that lies beneath.
-
-    Args:
-        subject: What the recording is about.
-        flight: The flight.
-        factor: How many times too far booms are bent; a round factor that shows it if left out.
-    """
-    machine, rest = subject.machine, at_rest(subject.model, subject.machine)
-    if factor is None:
-        factor = suited_factor(flight, {boom.name: boom.length for boom in machine.booms})
-
-    def frames(part: Trajectory, beside: Frames, over: Trajectory) -> Frames:
-        if BUS not in rest.positions:  # an arm: the readings of its equations place no body
-            return Frames(time=part.time, positions={}, quaternions={}, booms={})
-        return ghost(machine, rest, beside, over, factor).frames(part, beside)
-
-    return Beneath(
-        flight=flight,
-        known=(flight,),
-        key="reduced",
-        name="reduced",
-        over_key="simulated",
-        over_name="MuJoCo",
-        rest=rest,
-        bodies=[BUS] if BUS in rest.positions else [],
-        frames=frames,
-        factor=factor,
-        notes=(
-            f"Booms are drawn bent {factor:g} times as far as they are. Translucent: the reduced "
-            "model. It knows attitude and boom tips; its bus stands at the place of the MuJoCo bus "
-            "and its booms have the shape of the first cantilever mode through their tips.",
-        ),
-    )
-
-
-def channels(flight: Trajectory, rest: Drawing, machine: Spacecraft) -> list[Channel]:
-    """Returns the thruster channels of a flight.
-
-    Args:
-        flight: The flight, or a part of it.
-        rest: Its machine in the reference configuration.
-        machine: The machine.
-    """
-    units = channel_units(flight, rest)
-    return [
-        Channel(thruster=thruster, unit=units[thruster.name])
-        for thruster in machine.thrusters
-        if thruster.name in units
-    ]
 
 
 def write(
@@ -185,7 +76,7 @@ class Recording:
         stream.set_sinks(*sinks)
         stream.send_recording_name(subject.title)
         self._rest = at_rest(subject.model, subject.machine)
-        self._bodies = record_scene.drawn_bodies(self._rest)
+        self._bodies = drawn_bodies(self._rest)
         self._shown = 0  # rows of the flight beneath
         self._last: dict[str, dict[str, float]] = {}  # signals in the last row, by flight
         self._document("scenario", record_text.scenario_page(subject.scenario))
@@ -211,14 +102,22 @@ class Recording:
         Args:
             beneath: The flight.
         """
-        stream, flight, subject = self._stream, beneath.flight, self._subject
+        stream, known, subject = self._stream, beneath.known, self._subject
         self._beneath = beneath
         self._size = record_scene.extent(self._rest)
-        self._plots = record_signals.plots(beneath.known, list(self._rest.booms))
-        self._planes = record_chart.planes(subject.charts, beneath.known, subject.band)
-        duration = float(flight.time[-1]) or 1.0
-        self._spacing = min(0.05, duration / 1500)
-        self._end, self._edges = float(flight.time[0]), 0
+        self._plots = groups(known, list(self._rest.booms))
+        wide = sorted(subject.bands.items(), key=lambda band: -band[1])
+        plotted = {signal for group in self._plots for signal in group.signals}
+        self._bands = {signal: half for signal, half in wide if signal in plotted}
+        self._planes = record_chart.planes(subject.charts, known, self._bands)
+        longest = max(known, key=lambda flight: flight.time[-1])
+        self._ends = {
+            beneath.key: float(known[0].time[-1]),
+            beneath.over_key: float(known[-1].time[-1]),
+        }
+        self._every = spacing(longest)
+        self._edge_to_edge = min(0.05, float(longest.time[-1]) / 1500) or 1.0
+        self._edges, self._end = 0, 0.0
         root, other = self._root(beneath.over_key), self._root(beneath.key)
         record_scene.solids(stream, root, self._rest, self._bodies, False)
         record_scene.solids(stream, other, beneath.rest, beneath.bodies, True)
@@ -227,16 +126,16 @@ class Recording:
             (beneath.over_key, beneath.over_name, False),
             (beneath.key, beneath.name, True),
         ):
-            record_signals.styles(stream, self._plots, flight, key, name, under)
+            record_signals.styles(stream, self._plots, key, name, under)
             color = record_signals.AXES["z"][under]
             record_chart.track_styles(stream, self._planes, key, color, under)
-        if subject.band:
-            record_signals.band_style(stream, subject.band)
-        record_chart.plane_frames(stream, self._planes, flight)
+        record_signals.band_styles(stream, self._bands)
+        record_chart.plane_frames(stream, self._planes, beneath.flight)
         record_chart.maps(stream, subject.charts)
-        self._channels: list[Channel] = []
-        if beneath.channels:
-            record_signals.lane_styles(stream, beneath.channels, beneath.key, True)
+        self._channels = channels(beneath.flight, self._rest, subject.machine, known)
+        both = bool(beneath.channels)
+        record_signals.lane_styles(stream, self._channels, beneath.over_key if both else "", False)
+        record_signals.lane_styles(stream, beneath.channels, beneath.key, True)
         self._document("verdicts", record_text.unjudged_page(subject.title, beneath.notes))
         self._send_layout()
         self._flush()
@@ -247,20 +146,16 @@ class Recording:
         Args:
             part: The next rows, at least one.
         """
-        beneath, stream, subject = self._beneath, self._stream, self._subject
-        if not self._channels:
-            self._channels = channels(part, self._rest, subject.machine)
-            lanes = beneath.over_key if beneath.channels else ""
-            record_signals.lane_styles(stream, self._channels, lanes, False)
-        beside = simulated(subject.model, subject.machine, part, beneath.factor)
-        self._beside = beside, part
+        beneath, subject = self._beneath, self._subject
+        rows = thinned(part, self._every)
+        beside = simulated(subject.model, subject.machine, rows, beneath.factor)
+        self._beside = beside, rows
         root = self._root(beneath.over_key)
-        record_scene.motion(stream, root, beside, self._rest, self._bodies)
+        record_scene.motion(self._stream, root, beside, self._rest, self._bodies)
         self._signals(part, beneath.over_key, self._channels, self._nozzles)
-        end = float(part.time[-1])
-        self._end = end
-        self._fill_band(end)
-        self._show_beneath(end)
+        self._end = float(part.time[-1])
+        self._fill_bands(self._end)
+        self._show_beneath(self._end)
         self._flush()
 
     def conclude(self, verdicts: Sequence[Verdict], page: str | None = None) -> None:
@@ -271,7 +166,7 @@ class Recording:
             page: What stands in place of the table of verdicts, as Markdown.
         """
         longest = float(self._beneath.flight.time[-1])
-        self._fill_band(longest)
+        self._fill_bands(longest)
         self._show_beneath(longest)
         record_signals.verdict_events(self._stream, verdicts, self._end)
         title, notes = self._subject.title, self._beneath.notes
@@ -285,10 +180,10 @@ class Recording:
         """
         record_signals.remark(self._stream, self._end, reason)
 
-    def _fill_band(self, end: float) -> None:
-        if width := self._subject.band:
-            stream, spacing = self._stream, self._spacing
-            self._edges = record_signals.band(stream, self._edges, end, width, spacing)
+    def _fill_bands(self, end: float) -> None:
+        self._edges = record_signals.band(
+            self._stream, self._bands, self._edges, end, self._edge_to_edge
+        )
 
     def _show_beneath(self, end: float) -> None:
         """The rows of the flight beneath up to an instant."""
@@ -296,7 +191,7 @@ class Recording:
         stop = int(beneath.flight.time.searchsorted(end, side="right"))
         if stop > self._shown:
             part = selected(beneath.flight, slice(self._shown, stop))
-            frames = beneath.frames(part, *self._beside)
+            frames = beneath.frames(thinned(part, self._every), *self._beside)
             root = self._root(beneath.key)
             record_scene.motion(self._stream, root, frames, beneath.rest, beneath.bodies)
             self._signals(part, beneath.key, beneath.channels, {})
@@ -306,6 +201,11 @@ class Recording:
         self, part: Trajectory, key: str, found: Sequence[Channel], nozzles: dict[str, list[str]]
     ) -> None:
         stream, before = self._stream, self._last.get(key, {})
+        chosen = rows_to_show(part, self._channels, before)
+        chosen[-1] |= part.time[-1] == self._ends[key]
+        part = selected(part, chosen)
+        if not len(part.time):
+            return
         record_signals.histories(stream, self._plots, part, key)
         record_chart.tracks(stream, self._planes, part, key, before)
         happened = changes(part, found, before)
@@ -313,7 +213,8 @@ class Recording:
         record_signals.lanes(stream, happened, lanes)
         record_signals.events(stream, happened, lanes)
         record_scene.plumes(stream, nozzles, happened, PLUME * self._size)
-        self._last[key] = {name: float(value[-1]) for name, value in part.signals.items()}
+        last = {name: float(value[-1]) for name, value in part.signals.items()}
+        self._last[key] = {"time": float(part.time[-1]), **last}
 
     def _send_layout(self) -> None:
         """The file opens at rest; a viewer that is open follows the flight."""
@@ -322,16 +223,16 @@ class Recording:
             extent=self._size,
             factor=beneath.factor,
             ghost=beneath.name,
-            ends={
-                key: float(flight.time[-1])
-                for key, flight in (
-                    (beneath.key, beneath.known[0]),
-                    (beneath.over_key, beneath.known[-1]),
-                )
-            },
+            ends=self._ends,
             planes=self._planes,
             charts=self._subject.charts,
-            band=self._subject.band,
+            groups=self._plots,
+            bands=self._bands,
+            relays=any(not channel.thruster.proportional for channel in self._channels),
+            duration=max(self._ends.values()),
+            booms=bool(self._rest.booms),
+            drawn=bool(beneath.bodies),
+            upright=BUS not in self._rest.positions,
         )
         self._stream.send_blueprint(blueprint(layout, following=False))
         if self._viewer:

@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 
 from spacecraft_sim.chart import Charts, Line, Map, Portrait, portraits
 from spacecraft_sim.record_scene import TIMELINE, Color, Stream
-from spacecraft_sim.trajectory import Trajectory, moving_axes
+from spacecraft_sim.trajectory import Trajectory, between_rows, moving_axes
 
 Array = np.ndarray
 
@@ -23,6 +23,8 @@ HERE, BAND, NIGHT = (255, 98, 74), (15, 38, 27), (13, 15, 22)
 AXIS, TICK = (70, 75, 88), (150, 157, 172)
 STRIDE = 10  # rows to a strip of a track: a view shows or leaves out whole strips
 FINAL = 60.0  # the end of a flight, shown on its own, s
+RESTING = 1e-9  # share of the window of a flight below which its end shows rounding alone
+PIECES = 4  # into which a track is divided between two rows
 FAR = 4.0  # how far lines are drawn, in half-widths of the window
 
 
@@ -34,13 +36,15 @@ class Plane:
         portrait: The portrait.
         word: Name of the view in paths.
         title: What it shows.
-        half: Half-widths of its window, in the units of the signals.
+        centre: Middle of its window, in the units of the signals.
+        half: Half-widths of its window, likewise.
         late: Whether only the last `FINAL` seconds of each flight are shown.
     """
 
     portrait: Portrait
     word: str
     title: str
+    centre: tuple[float, float]
     half: tuple[float, float]
     late: bool = False
 
@@ -49,43 +53,69 @@ class Plane:
         """Path of the view."""
         return f"phase/{_slug(self.portrait.name)}/{self.word}"
 
+    def placed(self, points: Array) -> Array:
+        """Returns points of the portrait in the frame of the view, where y is down.
 
-def planes(charts: Charts, known: Sequence[Trajectory], band: float | None) -> tuple[Plane, ...]:
+        Args:
+            points: Shape (n, 2), in the units of the signals.
+        """
+        return (points - self.centre) / self.half * (1, -1)
+
+
+def planes(
+    charts: Charts, known: Sequence[Trajectory], bands: Mapping[str, float]
+) -> tuple[Plane, ...]:
     """Returns the views of each portrait: the whole flight, its end, and what is guaranteed.
 
     Args:
         charts: What the law draws; the axis that moves most gets a portrait of its own if nothing.
         known: Flights that are known beforehand, for the windows.
-        band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
+        bands: Half-widths that signals are to keep, by signal, rad.
     """
     drawn, found = portraits(charts), []
     if not drawn:
         axis = next(iter(moving_axes(known[0], "quasi_rigid_angle")), "")
         names = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
-        drawn = [Portrait(name="plane", title="", signals=names, channel="", band=band)]
+        half = bands.get(names[0])
+        drawn = [Portrait(name="plane", title="", signals=names, channel="", band=half)]
     for portrait in drawn:
         if not all(name in flight.signals for flight in known for name in portrait.signals):
             continue
-        for word, title, late in (("whole", "whole flight", False), ("end", "last minute", True)):
-            half = [1.1 * _peak(known, signal, late) for signal in portrait.signals]
-            window = half[0] or 1.0, half[1] or 1.0
-            plane = Plane(portrait=portrait, word=word, title=title, half=window, late=late)
-            found.append(plane)
+        whole = [_window(known, signal, False) for signal in portrait.signals]
+        end = [_window(known, signal, True) for signal in portrait.signals]
+        found.append(_plane(portrait, "whole", "whole flight", whole))
+        # What has come to rest has no end to look at.
+        if all(e[1] > RESTING * w[1] for e, w in zip(end, whole, strict=True)):
+            found.append(_plane(portrait, "end", "last minute", end, late=True))
         if bounds := [line.points for line in portrait.lines if line.look == "bound"]:
-            half = (1.3 * np.nanmax(np.abs(np.vstack(bounds)), axis=0)).tolist()
-            window = half[0] or 1.0, half[1] or 1.0
-            found.append(
-                Plane(portrait=portrait, word="bound", title="what is guaranteed", half=window)
-            )
+            half = 1.3 * np.nanmax(np.abs(np.vstack(bounds)), axis=0)
+            window = [(0.0, float(x) or 1.0) for x in half]
+            found.append(_plane(portrait, "bound", "what is guaranteed", window))
     return tuple(found)
 
 
-def _peak(known: Sequence[Trajectory], signal: str, late: bool) -> float:
+def _plane(
+    portrait: Portrait,
+    word: str,
+    title: str,
+    window: Sequence[tuple[float, float]],
+    late: bool = False,
+) -> Plane:
+    (x, a), (y, b) = window
+    return Plane(portrait=portrait, word=word, title=title, centre=(x, y), half=(a, b), late=late)
+
+
+def _window(known: Sequence[Trajectory], signal: str, late: bool) -> tuple[float, float]:
+    """Middle and half-width of what a signal does; about zero, unless it keeps far from it."""
     shown = [
-        np.abs(flight[signal][flight.time >= (flight.time[-1] - FINAL if late else -np.inf)])
+        flight[signal][flight.time >= (flight.time[-1] - FINAL if late else -np.inf)]
         for flight in known
     ]
-    return max(float(value.max()) for value in shown)
+    low, high = min(float(x.min()) for x in shown), max(float(x.max()) for x in shown)
+    middle, half = (low + high) / 2, (high - low) / 2
+    if abs(middle) < 3 * half or half == 0:
+        middle, half = 0.0, max(abs(low), abs(high))
+    return middle, 1.1 * half or 1.0
 
 
 def plane_frames(stream: Stream, drawn: Sequence[Plane], flight: Trajectory) -> None:
@@ -97,38 +127,44 @@ def plane_frames(stream: Stream, drawn: Sequence[Plane], flight: Trajectory) -> 
         flight: A flight, for the units.
     """
     for plane in drawn:
-        portrait, half = plane.portrait, np.array(plane.half) * (1, -1)
-        stream.log(plane.origin, rr.Transform3D(scale=[*half, 1.0]), static=True)
+        portrait, (x, y) = plane.portrait, plane.half
+        scale = rr.Transform3D(translation=[*plane.centre, 0.0], scale=[x, -y, 1.0])
+        stream.log(plane.origin, scale, static=True)
         cross = [[(-1, 0), (1, 0)], [(0, -1), (0, 1)]]
         axes = rr.LineStrips2D(cross, colors=AXIS, radii=-0.7, draw_order=2.0)
         stream.log(f"{plane.origin}/axes", axes, static=True)
-        (x, y), ends = portrait.signals, [(1.6, -0.07), (0.9, -1.12)]
         labels = [
-            f"{_words(x)} {plane.half[0]:.3g} {flight.units[x]}",
-            f"{_words(y)} {plane.half[1]:.3g} {flight.units[y]}",
+            f"{_words(name)} {_range(middle, half)} {flight.units[name]}"
+            for name, middle, half in zip(portrait.signals, plane.centre, plane.half, strict=True)
         ]
-        ticks = rr.Points2D(ends, labels=labels, colors=TICK, radii=-0.1)
+        places = [(1.6, -0.07), (0.9, -1.12)]
+        ticks = rr.Points2D(places, labels=labels, colors=TICK, radii=-0.1)
         stream.log(f"{plane.origin}/scale", ticks, static=True)
         if portrait.band:
-            width = portrait.band / half[0]
-            line = [[(0.0, -FAR), (0.0, FAR)]]
-            look = {"colors": BAND, "radii": width, "draw_order": 1.0}
+            middle = plane.placed(np.zeros((1, 2)))[0, 0]
+            line = [[(middle, -FAR), (middle, FAR)]]
+            look = {"colors": BAND, "radii": portrait.band / x, "draw_order": 1.0}
             stream.log(f"{plane.origin}/band", rr.LineStrips2D(line, **look), static=True)
         for k, region in enumerate(portrait.regions):
-            outline = np.vstack([region.outline, region.outline[:1]]) / half
+            outline = plane.placed(np.vstack([region.outline, region.outline[:1]]))
             path = f"{plane.origin}/regions/{_slug(region.name)}"
             _line(stream, path, outline, REGIONS[k % len(REGIONS)], 1.0)
         for k, line in enumerate(portrait.lines):
             path = f"{plane.origin}/lines/{k}_{_slug(line.name)}"
-            _log_line(stream, path, line, half, (k + 1) / (len(portrait.lines) + 1))
+            share = (k + 1) / (len(portrait.lines) + 1)
+            _log_line(stream, path, line, plane.placed(line.points), share)
 
 
-def _log_line(stream: Stream, path: str, line: Line, half: Array, share: float) -> None:
+def _range(middle: float, half: float) -> str:
+    return f"{middle:.4g} ± {half:.3g}" if middle else f"{half:.3g}"
+
+
+def _log_line(stream: Stream, path: str, line: Line, points: Array, share: float) -> None:
     """A line of the law with its name at a share of the way through the window.
 
     The viewer counts in single precision: what is far outside the window is cut off.
     """
-    points, color = line.points / half, COLORS[line.look]
+    color = COLORS[line.look]
     if len(pieces := _inside(points, np.array([FAR, FAR]))):
         width = 1.6 if line.look == "bound" else 1.1
         drawn = rr.LineStrips2D(list(pieces), colors=color, radii=-width, draw_order=10.0)
@@ -184,12 +220,29 @@ def tracks(
         points = np.stack([part[name] for name in portrait.signals], axis=1)
         times = [rr.TimeColumn(TIMELINE, duration=part.time)]
         stream.send_columns(f"{path}/now", times, rr.Points2D.columns(positions=points))
-        last = [before[name] for name in portrait.signals] if before else points[0]
-        joined, first = np.vstack([last, points]), np.arange(0, len(points), STRIDE)
-        rows = np.minimum(first[:, None] + np.arange(STRIDE + 1), len(points))
-        strips = joined[rows].astype(np.float32)  # the last one may stand still at its end
-        times = [rr.TimeColumn(TIMELINE, duration=part.time[first])]
+        if before:
+            last = [before[name] for name in portrait.signals]
+            points, time = np.vstack([last, points]), np.r_[before["time"], part.time]
+        else:
+            time = part.time
+        starts, strips = _strips(portrait, time, points)
+        times = [rr.TimeColumn(TIMELINE, duration=starts)]
         stream.send_columns(f"{path}/track", times, rr.LineStrips2D.columns(strips=strips))
+
+
+def _strips(portrait: Portrait, time: Array, points: Array) -> tuple[Array, Array]:
+    """Start of each strip of a track, s, and its points, shape (n, k, 2)."""
+    x, y = portrait.signals
+    pieces = 1
+    if y == x.replace("angle", "rate") and len(time) > 1:  # curved between the rows
+        pieces = PIECES
+        between = between_rows(time, *points.T, pieces=pieces)
+        points = np.vstack([between[:, :-1].reshape(-1, 2), points[-1:]])
+    long = STRIDE * pieces
+    first = np.arange(0, max(len(points) - 1, 1), long)
+    rows = np.minimum(first[:, None] + np.arange(long + 1), len(points) - 1)
+    # The last strip may stand still at its end.
+    return time[first // pieces], points[rows].astype(np.float32)
 
 
 def maps(stream: Stream, charts: Charts) -> None:

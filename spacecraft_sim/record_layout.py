@@ -1,5 +1,6 @@
 """The one layout of all recordings: the spacecraft, what was claimed, histories, phase planes."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,9 +11,11 @@ import rerun.blueprint as rrb
 from spacecraft_sim.chart import Charts
 from spacecraft_sim.record_chart import NIGHT, Plane, map_views, plane_views
 from spacecraft_sim.record_scene import TIMELINE
+from spacecraft_sim.record_signals import band_path
+from spacecraft_sim.signal_groups import Group
 
-NEAR = 8.0  # half-width of the plots that follow the cursor, s
-SPEED = 4.0  # of playback, over real time
+NEAR = 8.0  # half-width of the plots that follow the cursor, s, or a tenth of the flight
+MINUTE = 60.0  # which a playback lasts at least, if it is faster than real time, s
 DOCUMENTS = ("verdicts", "scenario")
 
 
@@ -23,20 +26,32 @@ class Layout:
     Attributes:
         extent: Size of the spacecraft, m.
         factor: How many times too far the booms are drawn bent.
+        booms: Whether there are any.
         ghost: Name of the flight that is drawn translucent.
+        drawn: Whether anything of it is drawn.
         ends: End of each flight, s, by its name in paths.
+        duration: Length of the longest flight, s.
+        groups: What is plotted.
         planes: Phase planes.
         charts: What the law draws.
-        band: Accuracy that the quasi-rigid angle shall keep, rad; None if none was asked for.
+        bands: Half-widths that signals are to keep, by signal, the widest first, rad.
+        relays: Whether there are channels with levels.
+        upright: Whether the machine stands on the ground, to be seen from the side.
     """
 
     extent: float
     factor: float
+    booms: bool
     ghost: str
+    drawn: bool
     ends: Mapping[str, float]
+    duration: float
+    groups: Sequence[Group]
     planes: Sequence[Plane]
     charts: Charts
-    band: float | None
+    bands: Mapping[str, float]
+    relays: bool
+    upright: bool
 
 
 def blueprint(layout: Layout, *, following: bool) -> rrb.Blueprint:
@@ -53,17 +68,20 @@ def blueprint(layout: Layout, *, following: bool) -> rrb.Blueprint:
         timeline=TIMELINE,
         state="collapsed",
         play_state="following" if following else "paused",
-        playback_speed=SPEED,
+        playback_speed=2.0 ** max(math.floor(math.log2(layout.duration / MINUTE)), 0),
     )
     columns = rrb.Horizontal(left, middle, right, column_shares=[4, 4, 3])
     return rrb.Blueprint(columns, panel, collapse_panels=True)
 
 
 def _space(layout: Layout) -> rrb.Spatial3DView:
-    eye = layout.extent * np.array([0.0, -1.15, 1.45])
+    eye = layout.extent * np.array([0.0, -1.9, 0.5] if layout.upright else [0.0, -1.15, 1.45])
+    eye *= 1.0 if layout.booms or layout.upright else 1.4  # booms are long and thin
+    words = ["Motion"] if not layout.booms else [f"Bending x {layout.factor:g}, grey: unbent"]
+    words += [f"translucent: {layout.ghost}"] if layout.drawn else []
     return rrb.Spatial3DView(
         origin="world",
-        name=f"Bending x {layout.factor:g}, grey: unbent; translucent: {layout.ghost} [m]",
+        name=f"{'; '.join(words)} [m]",
         background=NIGHT,
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(position=eye, look_target=[0, 0, 0], eye_up=[0, 0, 1]),
@@ -77,23 +95,27 @@ def _words() -> rrb.Tabs:
     return rrb.Tabs(documents[0], events, documents[1])
 
 
-def _time(near: bool) -> rrb.TimeAxis:
-    """The whole flight, or what is near the cursor."""
+def _time(near: float | None) -> rrb.TimeAxis:
+    """The whole flight, or some seconds on both sides of the cursor."""
     boundary = rr.TimeRangeBoundary
     start, end = boundary.infinite(), boundary.infinite()
     if near:
-        start, end = (boundary.cursor_relative(seconds=s * NEAR) for s in (-1, 1))
+        start, end = (boundary.cursor_relative(seconds=s * near) for s in (-1, 1))
     return rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
 
 
 def _plot(
-    origin: str, name: str, *, near: bool = False, half: float | None = None, band: bool = False
+    origin: str,
+    name: str,
+    *,
+    near: float | None = None,
+    half: float | None = None,
+    bounds: Sequence[str] = (),
 ) -> rrb.TimeSeriesView:
     """A plot of the whole flight, or near the cursor."""
-    bound = ["+ /bound/angle"] if band else []
     return rrb.TimeSeriesView(
         origin=origin,
-        contents=["+ $origin/**", *bound],
+        contents=["+ $origin/**", *(f"+ /{path}" for path in bounds)],
         name=name,
         axis_x=_time(near),
         axis_y=rrb.ScalarAxis(range=(-half, half)) if half else None,
@@ -102,21 +124,24 @@ def _plot(
 
 
 def _histories(layout: Layout) -> rrb.Vertical:
-    band = layout.band
-    kept = []
-    if band:
-        name = "Quasi-rigid angle within its bound [rad]"
-        kept.append(_plot("quasi_rigid_angle", name, half=1.6 * band, band=True))
-    angle = _plot("quasi_rigid_angle", "Quasi-rigid angle [rad]", band=bool(band))
-    return rrb.Vertical(
-        rrb.Tabs(_plot("attitude", "Attitude of the bus [rad]"), angle),
-        *kept,
-        rrb.Tabs(
-            _plot("rate", "Rate of the bus [rad/s]"),
-            _plot("quasi_rigid_rate", "Quasi-rigid rate [rad/s]"),
-        ),
-        _plot("tips", "Boom tips, deflection [m]"),
-    )
+    """Positions, those of them that have bounds once more near these, rates, boom tips."""
+    paths = {signal: band_path(k, signal) for k, signal in enumerate(layout.bands)}
+    rows: list[rrb.Container | rrb.View] = []
+    for role in ("position", "rate", "tip"):
+        groups = [group for group in layout.groups if group.role == role]
+        if groups:
+            rows.append(rrb.Tabs(*(_plot(g.name, f"{g.title} [{g.unit or '-'}]") for g in groups)))
+        kept = [g for g in groups if any(signal in paths for signal in g.signals)]
+        if kept:
+            rows.append(rrb.Tabs(*(_kept(group, layout.bands, paths) for group in kept)))
+    return rrb.Vertical(*rows)
+
+
+def _kept(group: Group, bands: Mapping[str, float], paths: Mapping[str, str]) -> rrb.TimeSeriesView:
+    own = [signal for signal in group.signals if signal in bands]
+    title = f"{group.title} within {'its bound' if len(own) == 1 else 'bounds'} [{group.unit}]"
+    half = 1.6 * max(bands[signal] for signal in own)
+    return _plot(group.name, title, half=half, bounds=[paths[signal] for signal in own])
 
 
 def _near_and_planes(layout: Layout, following: bool) -> rrb.Vertical:
@@ -124,14 +149,17 @@ def _near_and_planes(layout: Layout, following: bool) -> rrb.Vertical:
     firsts = [v for v, plane in zip(views, layout.planes, strict=True) if plane.word == "whole"]
     others = [v for v, plane in zip(views, layout.planes, strict=True) if plane.word != "whole"]
     upper = [rrb.Tabs(*found) for found in ([*firsts, *map_views(layout.charts)], others) if found]
-    return rrb.Vertical(
-        *upper,
-        rrb.Tabs(
-            _plot("thrust", "Thrust near the cursor [N or N m]", near=True),
-            _plot("thrust", "Thrust, whole flight [N or N m]"),
-        ),
-        rrb.StateTimelineView(
-            origin="relay", name="Relay near the cursor", time_view=_time(near=True)
-        ),
-        row_shares=[3] * len(upper) + [2, 1.5],
-    )
+    near = min(NEAR, layout.duration / 10)
+    thrust = [
+        _plot("thrust", "Thrust near the cursor [N or N m]", near=near),
+        _plot("thrust", "Thrust, whole flight [N or N m]"),
+    ]
+    # Pulses are seen from near, a torque that follows its command from afar.
+    thrust = thrust if layout.relays else thrust[::-1]
+    rows: list[rrb.Container | rrb.View] = [*upper, rrb.Tabs(*thrust)]
+    if layout.relays:
+        lanes = rrb.StateTimelineView(
+            origin="relay", name="Relay near the cursor", time_view=_time(near)
+        )
+        rows.append(lanes)
+    return rrb.Vertical(*rows, row_shares=[3] * len(upper) + [2, 1.5][: len(rows) - len(upper)])

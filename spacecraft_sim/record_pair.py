@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from spacecraft_sim import record, run_folder
-from spacecraft_sim.frames import Frames, at_rest, simulated, suited_factor
-from spacecraft_sim.record_scene import drawn_bodies
+from spacecraft_sim.beneath import Beneath, Subject, bent, channels
+from spacecraft_sim.frames import Frames, at_rest, drawn_bodies, simulated, suited_factor
 from spacecraft_sim.record_text import cell, verdict_table
 from spacecraft_sim.run_pair import Pair, Run, table
 from spacecraft_sim.trajectory import Trajectory
@@ -22,12 +22,12 @@ def write(path: Path, compared: Pair, factor: float | None = None) -> None:
     a, b = compared.a, compared.b
     below, above = run_folder.subject(a.mission), run_folder.subject(b.mission)
     names = {chart.name for chart in above.charts}
-    subject = record.Subject(
+    subject = Subject(
         title=f"A: {_name(a)}, B: {_name(b)}",
         scenario=f"# A: {a.folder}\n{below.scenario}\n\n# B: {b.folder}\n{above.scenario}",
         model=above.model,
         machine=above.machine,
-        band=above.band if above.band == below.band else None,
+        bands={s: half for s, half in above.bands.items() if below.bands.get(s) == half},
         charts=(*above.charts, *(x for x in below.charts if x.name not in names)),
     )
     if factor is None:
@@ -37,7 +37,7 @@ def write(path: Path, compared: Pair, factor: float | None = None) -> None:
     def frames(part: Trajectory, beside: Frames, over: Trajectory) -> Frames:
         return simulated(below.model, below.machine, part, factor)
 
-    beneath = record.Beneath(
+    beneath = Beneath(
         flight=a.flight,
         known=(a.flight, b.flight),
         key="A",
@@ -48,8 +48,8 @@ def write(path: Path, compared: Pair, factor: float | None = None) -> None:
         bodies=drawn_bodies(rest),
         frames=frames,
         factor=factor,
-        channels=record.channels(a.flight, rest, below.machine),
-        notes=(f"Booms are drawn bent {factor:g} times as far as they are. Translucent: run A.",),
+        channels=channels(a.flight, rest, below.machine, (a.flight, b.flight)),
+        notes=tuple(x for x in (bent(above.machine, factor), "Translucent: run A.") if x),
     )
     record.write(path, subject, b.flight, beneath, b.verdicts, page(compared, beneath.notes))
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import rerun as rr
 
-from spacecraft_sim.changes import Changes
+from spacecraft_sim.changes import Changes, Channel
 from spacecraft_sim.drawing import Drawing, Jet, Shape, boom_points, turned
 from spacecraft_sim.frames import Frames
 
@@ -22,6 +22,7 @@ BOOMS: tuple[tuple[Color, Color], ...] = (  # of a boom and of its ghost
     ((255, 200, 87), (120, 94, 41)),
     ((90, 205, 215), (42, 96, 101)),
 )
+RULERS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # m
 GHOST = 60  # opacity of a ghost's solids, of 255
 
 
@@ -38,8 +39,10 @@ def setting(stream: Stream, rest: Drawing) -> None:
         look = {"colors": FAINT, "radii": -1.0}  # negative: in points of the screen
         stream.log("world/attitude_zero", rr.LineStrips3D(straight, **look), static=True)
     size = extent(rest)
-    length = max(m for m in (0.01, 0.1, 1.0, 5.0, 10.0, 50.0) if m <= size or m == 0.01)
-    ends = [(x, -0.55 * size, 0.0) for x in (-length / 2, length / 2)]
+    length = max(m for m in RULERS if m <= size or m == RULERS[0])
+    wide = max((np.max(np.abs(s.position)) + np.max(s.size) for s in rest.shapes), default=0.0)
+    aside = min(0.55 * size + 0.3 * wide, 1.1 * size)
+    ends = [(x, -aside, 0.0) for x in (-length / 2, length / 2)]
     line = rr.LineStrips3D([ends], labels=[f"{length:g} m"], colors=GREY, radii=-1.0)
     stream.log("world/ruler", line, static=True)
 
@@ -112,29 +115,21 @@ def _together(booms: list[Array]) -> Array:
     return np.stack(padded, axis=1).reshape(-1, longest, 3).astype(np.float32)
 
 
-def drawn_bodies(rest: Drawing) -> list[str]:
-    """Returns the bodies that are drawn as solids or carry jets: all but the links of booms.
-
-    Args:
-        rest: The machine in its reference configuration.
-    """
-    links = {body for bodies in rest.booms.values() for body in bodies}
-    links |= {f"{boom}_tip_mass" for boom in rest.booms}
-    carriers = {jet.body for jet in rest.jets}
-    return [body for body in rest.positions if body not in links or body in carriers]
-
-
 def extent(rest: Drawing) -> float:
-    """Returns the distance of the farthest body origin or boom tip from the first body, m.
+    """Returns the distance of the farthest thing that is drawn from the first body, m.
 
     Args:
         rest: The machine in its reference configuration.
     """
-    origins = np.array([position[0] for position in rest.positions.values()])
+    centre = next(iter(rest.positions.values()))[0]
     tips = [boom_points(rest, boom)[0][0, -1] for boom in rest.booms]
-    shapes = [abs(s.position).max() + max(s.size) for s in rest.shapes]
-    reach = np.linalg.norm(np.array([*origins, *tips]) - origins[0], axis=1).max()
-    return float(max(reach, *shapes, 0.01))
+    reach = [float(np.linalg.norm(tip - centre)) for tip in tips]
+    for shape in rest.shapes:
+        middle = rest.positions[shape.body][0]
+        middle = middle + turned(rest.quaternions[shape.body][0], shape.position)
+        size = np.linalg.norm(shape.size) if shape.kind == "box" else np.max(shape.size)
+        reach.append(float(np.linalg.norm(middle - centre) + size))
+    return max(*reach, 0.01) if reach else 1.0
 
 
 def nozzles(stream: Stream, root: str, rest: Drawing) -> dict[str, list[str]]:
@@ -172,7 +167,7 @@ def plumes(
     for change in found:
         if change.what == "command" or not len(change.time):
             continue
-        length = size * throttle(change.value, change.channel.thruster.levels)
+        length = size * throttle(change.value, change.channel)
         length[length == 0] = 1e-6  # a transform must have an inverse
         scale = np.stack([abs(length), abs(length), length], axis=1)
         times = [rr.TimeColumn(TIMELINE, duration=change.time)]
@@ -180,16 +175,20 @@ def plumes(
             stream.send_columns(path, times, rr.Transform3D.columns(scale=scale))
 
 
-def throttle(thrust: Array, levels: Sequence[float]) -> Array:
-    """Returns the signed size from 0 to 1 of a thrust, on a log scale: its levels span decades.
+def throttle(thrust: Array, channel: Channel) -> Array:
+    """Returns the signed size from 0 to 1 of a thrust; on a log scale where levels span decades.
 
     Args:
         thrust: The thrust, shape (n,), N or N m.
-        levels: The levels of its channel.
+        channel: Its channel.
     """
-    least, most = min(levels), max(levels)
-    share = np.log(np.maximum(np.abs(thrust), least) / least) / max(np.log(most / least), 1e-9)
-    return np.sign(thrust) * (0.5 + 0.5 * share if most > least else 1.0)
+    least, most = min(channel.thruster.levels), max(channel.thruster.levels)
+    if channel.thruster.proportional:
+        return np.clip(thrust / channel.largest, -1, 1)
+    if most == least:
+        return thrust / most
+    share = np.log(np.maximum(np.abs(thrust), least) / least) / np.log(most / least)
+    return np.sign(thrust) * (0.5 + 0.5 * share)
 
 
 def _nozzles(jet: Jet, rest: Drawing) -> list[tuple[Array, Array]]:

@@ -1,7 +1,6 @@
 """The signals of two flights, one over the other: histories, bounds, lanes of thrust, events."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import rerun as rr
@@ -9,7 +8,8 @@ import rerun as rr
 from spacecraft_sim.changes import BETWEEN, Changes, Channel, What
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.record_scene import BOOMS, TIMELINE, Color, Stream, throttle
-from spacecraft_sim.trajectory import Trajectory, moving_axes
+from spacecraft_sim.signal_groups import Group
+from spacecraft_sim.trajectory import Trajectory
 
 Array = np.ndarray
 
@@ -18,138 +18,108 @@ AXES = {  # colours of the flight on top and of the one beneath
     "y": ((98, 205, 132), (228, 216, 92)),
     "x": ((255, 122, 144), (214, 130, 255)),
 }
+CURVES = (*BOOMS, ((77, 163, 255), (38, 80, 125)), ((255, 122, 144), (125, 60, 70)))
 PLUS, MINUS, OFF = (240, 98, 74), (74, 144, 240), (44, 47, 56)
-GREY, BAND = (120, 126, 140), (22, 62, 40)
+GREY = (120, 126, 140)
+BANDS = ((22, 62, 40), (18, 50, 58), (48, 56, 26))
 AMBER = ((255, 200, 87), (150, 104, 24))  # thrust of the flight on top and of the one beneath
-KINDS = ("attitude", "quasi_rigid_angle", "rate", "quasi_rigid_rate")
 WIDTHS = (2.0, 4.2)  # of the line on top and of the one beneath
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plot:
-    """Signals that are drawn together, one entity a flight.
-
-    Attributes:
-        view: Path of the view.
-        signals: Their names.
-        labels: Their names in the key.
-        colors: Of each signal: on top and beneath.
-    """
-
-    view: str
-    signals: tuple[str, ...]
-    labels: tuple[str, ...]
-    colors: tuple[tuple[Color, Color], ...]
-
-
-def plots(known: Sequence[Trajectory], booms: Sequence[str]) -> tuple[Plot, ...]:
-    """Returns what is plotted: whatever moves.
-
-    Args:
-        known: Flights that are known beforehand.
-        booms: Names of the booms.
-    """
-    found = []
-    for kind in KINDS:
-        if axes := sorted({axis for flight in known for axis in moving_axes(flight, kind)}):
-            signals = tuple(f"{kind}_{axis}" for axis in axes)
-            colors = tuple(AXES[axis] for axis in axes)
-            found.append(Plot(view=kind, signals=signals, labels=tuple(axes), colors=colors))
-    tips = [
-        (boom, axis, k, max(float(np.ptp(flight[f"{boom}_tip_{axis}"])) for flight in known))
-        for k, boom in enumerate(booms)
-        for axis in "yz"
-        if all(f"{boom}_tip_{axis}" in flight.signals for flight in known)
-    ]
-    least = 1e-3 * max((swing for *_, swing in tips), default=0.0)
-    if moving := [(boom, axis, k) for boom, axis, k, swing in tips if swing >= least]:
-        tip = Plot(
-            view="tips",
-            signals=tuple(f"{boom}_tip_{axis}" for boom, axis, _ in moving),
-            labels=tuple(f"{boom} {axis}" for boom, axis, _ in moving),
-            colors=tuple(BOOMS[k % len(BOOMS)] for *_, k in moving),
-        )
-        found.append(tip)
-    return tuple(found)
-
-
-def styles(
-    stream: Stream, drawn: Sequence[Plot], flight: Trajectory, key: str, name: str, beneath: bool
-) -> None:
+def styles(stream: Stream, drawn: Sequence[Group], key: str, name: str, beneath: bool) -> None:
     """Logs how the lines of a flight look.
 
     Args:
         stream: The recording.
-        drawn: The plots.
-        flight: A flight, for the units.
+        drawn: What is plotted.
         key: Name of the flight in paths.
         name: Name of the flight in keys.
         beneath: Whether it is drawn beneath the other.
     """
-    for plot in drawn:
+    for group in drawn:
         # Booms often swing alike: the later ones are thinner, so that all can be seen.
-        ranks = np.arange(len(plot.signals)) if plot.view == "tips" else np.zeros(len(plot.signals))
+        ranks = np.arange(len(group.signals)) * (group.role == "tip")
         look = rr.SeriesLines(
-            names=[
-                f"{label}, {name} [{flight.units[signal]}]"
-                for label, signal in zip(plot.labels, plot.signals, strict=True)
-            ],
-            colors=[pair[beneath] for pair in plot.colors],
+            names=[f"{label}, {name} [{group.unit or '-'}]" for label in group.labels],
+            colors=[_colors(group, k)[beneath] for k in range(len(group.labels))],
             widths=np.maximum(WIDTHS[beneath] - 0.8 * ranks, 0.8),
             aggregation_policy="MinMax",  # the average of a limit cycle would be a flat line
         )
-        stream.log(f"{plot.view}/{key}", look, static=True)
+        stream.log(f"{group.name}/{key}", look, static=True)
 
 
-def histories(stream: Stream, drawn: Sequence[Plot], part: Trajectory, key: str) -> None:
+def _colors(group: Group, k: int) -> tuple[Color, Color]:
+    """Axes and booms keep their colours from plot to plot."""
+    return AXES.get(group.labels[k]) or CURVES[k % len(CURVES)]
+
+
+def histories(stream: Stream, drawn: Sequence[Group], part: Trajectory, key: str) -> None:
     """Logs a part of a flight.
 
     Args:
         stream: The recording.
-        drawn: The plots.
+        drawn: What is plotted.
         part: The part.
         key: Name of the flight in paths.
     """
     times = [rr.TimeColumn(TIMELINE, duration=part.time)]
-    for plot in drawn:
-        if all(signal in part.signals for signal in plot.signals):
-            values = np.stack([part[signal] for signal in plot.signals], axis=1)
+    for group in drawn:
+        if all(signal in part.signals for signal in group.signals):
+            values = np.stack([part[signal] for signal in group.signals], axis=1)
             scalars = rr.Scalars.columns(scalars=values.ravel())
-            counts = np.full(len(part.time), len(plot.signals))
-            stream.send_columns(f"{plot.view}/{key}", times, scalars.partition(counts))
+            counts = np.full(len(part.time), len(group.signals))
+            stream.send_columns(f"{group.name}/{key}", times, scalars.partition(counts))
 
 
-def band_style(stream: Stream, band: float) -> None:
-    """Logs how the bound of the angle looks.
+def band_styles(stream: Stream, bands: Mapping[str, float]) -> None:
+    """Logs how the bounds of signals look; the widest lies at the bottom.
 
     Args:
         stream: The recording.
-        band: Half-width, rad.
+        bands: Half-widths by signal, the widest first, rad.
     """
-    look = rr.SeriesLines(
-        names=f"±{band:g} rad", colors=BAND, widths=4, aggregation_policy="MinMax"
-    )
-    stream.log("bound/angle", look, static=True)
+    for k, (signal, half) in enumerate(bands.items()):
+        look = rr.SeriesLines(
+            names=f"{signal[-1]} ±{half:g} rad",
+            colors=BANDS[k % len(BANDS)],
+            widths=4,
+            aggregation_policy="MinMax",
+        )
+        stream.log(band_path(k, signal), look, static=True)
 
 
-def band(stream: Stream, first: int, stop: float, band: float, spacing: float) -> int:
-    """Logs the bound of the angle as a band: a line so quick between its edges that it fills it.
+def band_path(k: int, signal: str) -> str:
+    """Returns the path of a bound: lines are drawn over each other in the order of their paths.
+
+    Args:
+        k: Rank of the bound, the widest first.
+        signal: The signal.
+    """
+    return f"Bounds/{k}_{signal}"
+
+
+def band(
+    stream: Stream, bands: Mapping[str, float], first: int, stop: float, spacing: float
+) -> int:
+    """Logs bounds as bands: lines so quick between their edges that they fill them.
 
     Args:
         stream: The recording.
-        first: How many points of the line are logged already.
+        bands: Half-widths by signal, the widest first, rad.
+        first: How many points of each line are logged already.
         stop: Until when, s.
-        band: Half-width, rad.
         spacing: Time from edge to edge, s.
 
     Returns:
         How many points are logged now.
     """
     count = np.arange(first, int(stop / spacing + 1e-6) + 1)
-    if len(count):
+    if len(count) and bands:
         times = [rr.TimeColumn(TIMELINE, duration=count * spacing)]
-        edges = rr.Scalars.columns(scalars=np.where(count % 2, -band, band))
-        stream.send_columns("bound/angle", times, edges)
+        side = np.where(count % 2, -1.0, 1.0)
+        for k, (signal, half) in enumerate(bands.items()):
+            edges = rr.Scalars.columns(scalars=half * side)
+            stream.send_columns(band_path(k, signal), times, edges)
     return first + len(count)
 
 
@@ -162,26 +132,31 @@ def lane_styles(stream: Stream, channels: Sequence[Channel], name: str, beneath:
         name: Name of the flight, put before the lanes' names; empty for none.
         beneath: Whether the flight is drawn beneath the other.
     """
-    for channel in channels:
-        values = np.array(list(channel.states.values()))
-        share = np.abs(throttle(values, channel.thruster.levels))[:, None]
-        bright = np.where(values[:, None] > 0, PLUS, MINUS)
-        colors = np.where(share > 0, OFF + share * (bright - OFF), OFF)
-        lane = rr.StateConfiguration(
-            values=[*channel.states, *BETWEEN],
-            colors=np.vstack([colors, PLUS, MINUS]).astype(np.uint8),
-        )
+    for k, channel in enumerate(channels):
+        relay = not channel.thruster.proportional
         for what in ("command", "thrust"):
             path = _lane(channel, what, name)
-            stream.log(f"relay/{path}", lane, static=True)
+            if relay:
+                stream.log(f"relay/{path}", _states(channel), static=True)
+            bright = CURVES[k % len(CURVES)][beneath] if len(channels) > 1 else AMBER[beneath]
             plot = rr.SeriesLines(
                 names=f"{path} [{channel.unit}]",
-                colors=GREY if what == "command" else AMBER[beneath],
+                colors=GREY if what == "command" else bright,
                 widths=1.2 if what == "command" else 2.0,
-                interpolation_mode="StepAfter",
+                interpolation_mode="StepAfter" if relay else "Linear",
                 aggregation_policy="MinMax",
             )
             stream.log(f"thrust/{path}", plot, static=True)
+
+
+def _states(channel: Channel) -> rr.StateConfiguration:
+    values = np.array(list(channel.states.values()))
+    share = np.abs(throttle(values, channel))[:, None]
+    bright = np.where(values[:, None] > 0, PLUS, MINUS)
+    colors = np.where(share > 0, OFF + share * (bright - OFF), OFF)
+    return rr.StateConfiguration(
+        values=[*channel.states, *BETWEEN], colors=np.vstack([colors, PLUS, MINUS]).astype(np.uint8)
+    )
 
 
 def lanes(stream: Stream, found: Sequence[Changes], name: str) -> None:
@@ -200,7 +175,7 @@ def lanes(stream: Stream, found: Sequence[Changes], name: str) -> None:
         time, value = (time, value) if fresh else (change.time, change.value)
         times = [rr.TimeColumn(TIMELINE, duration=time)]
         stream.send_columns(f"thrust/{path}", times, rr.Scalars.columns(scalars=value))
-        if len(change.time):
+        if len(change.time) and not change.channel.thruster.proportional:
             states = change.channel.state_by_state(change.value)
             times = [rr.TimeColumn(TIMELINE, duration=change.time)]
             stream.send_columns(f"relay/{path}", times, rr.StateChange.columns(state=states))
@@ -227,6 +202,7 @@ def events(stream: Stream, found: Sequence[Changes], name: str) -> None:
             f"{name}: {words}" if name else words,
         )
         for change in found
+        if not change.channel.thruster.proportional  # such a thrust changes all the time
         for time, words in zip(change.time.tolist(), change.words(), strict=True)
     ]
     _log_events(stream, sorted(rows))

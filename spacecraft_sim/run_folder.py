@@ -19,8 +19,8 @@ from spacecraft_sim.trajectory import Trajectory
 from spacecraft_sim.versions import versions
 
 if TYPE_CHECKING:
-    from spacecraft_sim.record import Subject
-    from spacecraft_sim.run_pair import Pair
+    from spacecraft_sim.beneath import Subject
+    from spacecraft_sim.run_pair import Pair, Run
 
 
 def create(path: Path | None, name: str) -> Path:
@@ -97,14 +97,14 @@ def subject(mission: Mission) -> "Subject":
     Args:
         mission: What is flown.
     """
-    from spacecraft_sim import record
+    from spacecraft_sim.beneath import Subject
 
-    return record.Subject(
+    return Subject(
         title=mission.scenario.title,
         scenario=resolved(mission.scenario),
         model=mission.mujoco.model.ptr,
         machine=mission.machine,
-        band=mission.accuracy,
+        bands=mission.bands,
         charts=charts_of(mission.controller),
     )
 
@@ -191,10 +191,15 @@ def write_pair(folder: Path, compared: "Pair", factor: float | None) -> None:
         a=a.flight,
         b=b.flight,
         title=f"A: {names[0]},  B: {names[1]}",
-        bands=(a.mission.accuracy, b.mission.accuracy),
+        booms=[x.name for x in a.mission.machine.booms if x.name in _booms(b)],
+        bands=(a.mission.bands, b.mission.bands),
         table=run_pair.table(compared),
     )
     record_pair.write(folder / "recording.rrd", compared, factor)
+
+
+def _booms(run: "Run") -> set[str]:
+    return {boom.name for boom in run.mission.machine.booms}
 
 
 def _plain(verdict: Verdict) -> dict[str, Any]:

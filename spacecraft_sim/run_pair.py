@@ -18,11 +18,6 @@ from spacecraft_sim.versions import versions
 
 Array = np.ndarray
 Figures = dict[tuple[str, str], float | None]  # by name and unit; None if there is no such figure
-_READINGS = {
-    f"{kind}_{axis}"
-    for kind in ("attitude", "quasi_rigid_angle", "rate", "quasi_rigid_rate")
-    for axis in "xyz"
-}
 LATE = 0.1  # share of a flight that counts as its end
 _WORDS = ("name", "title", "description", "versions")  # of a scenario: they fly nothing
 
@@ -179,7 +174,7 @@ def table(compared: Pair) -> list[tuple[str, list[tuple[str, ...]]]]:
     signals = [
         (d.signal, "", "", f"at most {d.max_error:.4g} {d.unit}, rms {d.rms_error:.4g}")
         for d in compared.signals
-        if d.signal in _READINGS or d.signal.endswith("_tip_y")
+        if d.unit in ("rad", "rad/s", "m") and "." not in d.signal and d.max_error > 0
     ]
     return [*lines, ("signals", signals)]
 
@@ -227,8 +222,12 @@ def _flat(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
 def _figures(flight: Trajectory) -> Figures:
     late = flight.time >= flight.time[0] + (1 - LATE) * (flight.time[-1] - flight.time[0])
     found: Figures = {("flight", "s"): float(flight.time[-1])}
-    for kind in ("attitude", "quasi_rigid_angle", "rate"):
-        names = [f"{kind}_{axis}" for axis in "xyz" if f"{kind}_{axis}" in flight.signals]
+    kinds = {
+        kind: [f"{kind}_{axis}" for axis in "xyz" if f"{kind}_{axis}" in flight.signals]
+        for kind in ("attitude", "quasi_rigid_angle", "rate")
+    }
+    joints = {name: [name] for name in flight.signals if f"{name}_rate" in flight.signals}
+    for kind, names in {**kinds, **joints}.items():
         if names:
             size = np.linalg.norm([flight[name] for name in names], axis=0)
             words, unit = kind.replace("quasi_", "quasi-").replace("_", " "), flight.units[names[0]]

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spacecraft_sim.changes import Channel, changes
+from spacecraft_sim.changes import Channel, changes, rows_to_show
 from spacecraft_sim.spacecraft import Thruster
 from spacecraft_sim.trajectory import Trajectory, selected
 
-CHANNEL = Channel(thruster=Thruster(name="jet", levels=(1.0, 8.0)), unit="N m")
+CHANNEL = Channel(thruster=Thruster(name="jet", levels=(1.0, 8.0)), unit="N m", largest=8.0)
 
 
 def flight(command, thrust=None):
@@ -88,3 +88,44 @@ def test_the_states_of_a_channel_are_its_levels_of_both_signs_and_off():
 
 def test_before_a_flight_there_is_no_value():
     assert math.isnan(changes(flight([1]), [CHANNEL], {})[0].before)
+
+
+def spun(times, *, proportional, command):
+    thruster = Thruster(name="jet", levels=(1.0, 8.0), proportional=proportional)
+    channel = Channel(thruster=thruster, unit="N m", largest=8.0)
+    value = np.array(command, dtype=float)
+    signals = {"jet_command": value, "jet": value}
+    return Trajectory(time=np.array(times), signals=signals, units={}), [channel]
+
+
+def test_rows_in_which_nothing_happens_are_shown_every_fiftieth_of_a_second():
+    times = np.arange(1000) * 1e-3
+    part, channels = spun(times, proportional=True, command=np.sin(times))
+    shown = part.time[rows_to_show(part, channels, {})]
+    np.testing.assert_allclose(shown, np.arange(50) * 0.02, atol=1e-12)
+
+
+def test_rows_at_which_a_relay_acts_are_all_shown():
+    times = np.arange(1000) * 1e-3
+    command = np.where((times > 0.1) & (times < 0.105), 8.0, 1.0)
+    part, channels = spun(times, proportional=False, command=command)
+    chosen = rows_to_show(part, channels, {})
+    changed = np.flatnonzero(np.diff(command)) + 1
+    assert np.all(chosen[changed])
+    assert np.count_nonzero(chosen) <= 50 + len(changed)
+
+
+@given(st.integers(1, 200))
+def test_a_flight_in_parts_shows_the_rows_of_the_whole(size):
+    times = np.arange(500) * 3.1e-3
+    part, channels = spun(times, proportional=False, command=np.sign(np.sin(9 * times)))
+    whole, before, found = rows_to_show(part, channels, {}), {}, []
+    for k in range(0, len(times), size):
+        piece = selected(part, slice(k, k + size))
+        chosen = rows_to_show(piece, channels, before)
+        found += piece.time[chosen].tolist()
+        if chosen.any():
+            last = np.flatnonzero(chosen)[-1]
+            before = {name: value[last] for name, value in piece.signals.items()}
+            before["time"] = piece.time[last]
+    assert found == part.time[whole].tolist()

@@ -44,8 +44,7 @@ def drawn(case, factor=1.0):
     model, machine = ready.mujoco.model.ptr, ready.machine
     simulated = frames.simulated(model, machine, measured, factor)
     rest = frames.at_rest(model, machine)
-    ghost = frames.ghost(machine, rest, simulated, measured, factor)
-    return simulated, ghost.frames(predicted, simulated)
+    return simulated, frames.bus_alone(machine, rest, predicted, simulated, measured, factor)
 
 
 def tips_in_root_frames(case, found, sign):
@@ -60,7 +59,7 @@ def tips_in_root_frames(case, found, sign):
 @pytest.mark.parametrize("case", ["planar", "free"])
 def test_the_drawn_tip_is_where_the_sensor_says(case, boom, request):
     case = request.getfixturevalue(case)
-    measured = frames.thinned(case[1])
+    measured = case[1]
     tip = tips_in_root_frames(case, drawn(case)[0], boom)
     np.testing.assert_allclose(tip[:, 0], measured[f"{boom}_tip_x"], atol=1e-9)  # rounding
     np.testing.assert_allclose(tip[:, 1], measured[f"{boom}_tip_y"], atol=1e-9)
@@ -74,7 +73,7 @@ def test_bending_is_exaggerated_in_proportion(planar):
 
 @pytest.mark.parametrize("boom", ["left", "right"])
 def test_the_tip_of_the_ghost_is_the_reading_times_the_factor(planar, boom):
-    predicted = frames.thinned(planar[2])
+    predicted = planar[2]
     tip = tips_in_root_frames(planar, drawn(planar, 5.0)[1], boom)
     np.testing.assert_allclose(tip[:, 1], 5 * predicted[f"{boom}_tip_y"], atol=1e-9)  # rounding
 
@@ -82,7 +81,7 @@ def test_the_tip_of_the_ghost_is_the_reading_times_the_factor(planar, boom):
 def test_the_ghost_has_the_shape_of_the_only_mode_of_the_galerkin_model(planar):
     ready, _, predicted = planar
     ghost = drawn(planar)[1]
-    turn = Rotation.from_rotvec(frames.attitude(frames.thinned(predicted))[0])
+    turn = Rotation.from_rotvec([0.0, 0.0, predicted["attitude_z"][0]])
     inside = turn.inv().apply(ghost.booms["left"][0]) - (3.0, 0.0, 0.0)
     q = ready.scenario.initial.boom_amplitude  # y = q Phi(x), by the definition of the model
     wanted = q * beam.mode_shape(1, inside[:, 0], 7.5)
@@ -106,7 +105,7 @@ def test_both_plants_are_drawn_alike_where_they_start(case, request):
 
 
 def test_the_attitude_of_the_ghost_is_that_of_its_model(free):
-    predicted, ghost = frames.thinned(free[2]), drawn(free)[1]
+    predicted, ghost = free[2], drawn(free)[1]
     wanted = Rotation.from_rotvec(np.stack([predicted[f"attitude_{a}"] for a in "xyz"], axis=1))
     found = Rotation.from_quat(ghost.quaternions[BUS], scalar_first=True)
     assert (wanted.inv() * found).magnitude().max() < 1e-9  # rounding
@@ -117,7 +116,7 @@ def test_the_ghost_shares_the_place_of_the_bus(free):
     rest = frames.at_rest(ready.mujoco.model.ptr, ready.machine)
     still, _ = drawn(free)
     adrift = dataclasses.replace(still, positions={BUS: np.outer(still.time, (1.0, 2.0, 3.0))})
-    ghost = frames.ghost(ready.machine, rest, adrift, measured, 1.0).frames(predicted, adrift)
+    ghost = frames.bus_alone(ready.machine, rest, predicted, adrift, measured, 1.0)
     place = np.outer(ghost.time, (1.0, 2.0, 3.0))  # between frames along a straight line
     np.testing.assert_allclose(ghost.positions[BUS], place, atol=1e-12)
     root = ghost.booms["left"][:, 0] - place
@@ -140,7 +139,7 @@ def test_parts_of_a_flight_make_the_frames_of_the_whole(planar):
 @given(st.lists(st.floats(0, 50), min_size=1, max_size=60, unique=True))
 def test_frames_are_thinned_to_one_a_tenth_of_a_second_with_both_ends(times):
     time = np.sort(times)
-    thin = frames.thinned(Trajectory(time=time, signals={"x": 2 * time}, units={}))
+    thin = frames.thinned(Trajectory(time=time, signals={"x": 2 * time}, units={}), 0.1)
     assert thin.time[0] == time[0]
     assert thin.time[-1] == time[-1]
     np.testing.assert_array_equal(thin["x"], 2 * thin.time)
@@ -161,6 +160,55 @@ def test_the_factor_brings_the_largest_deflection_to_a_quarter_of_the_boom(defle
 
 def test_a_machine_without_booms_is_not_exaggerated():
     assert frames.suited_factor(Trajectory(time=np.zeros(1), signals={}, units={}), {}) == 1.0
+
+
+def test_the_ghost_of_an_arm_is_posed_by_its_joints():
+    ready = mission.assemble(mission.load_scenario("burkov-position", ("duration=0.5",)))
+    model, machine = ready.mujoco.model.ptr, ready.machine
+    measured, predicted = ready.fly(), ready.fly("reduced")
+    joints = frames.read_joints(model, predicted)
+    assert joints == ["joint_1", "joint_2"]
+    whole = frames.simulated(model, machine, measured, 1.0)
+    # The readings of the full plant are its coordinates: the same poses, by another way.
+    again = frames.posed(model, machine, measured, joints, 1.0)
+    assert set(again.positions) == {"arm_1", "arm_2"}
+    for body in again.positions:
+        np.testing.assert_array_equal(again.positions[body], whole.positions[body])
+        np.testing.assert_array_equal(again.quaternions[body], whole.quaternions[body])
+    ghost = frames.posed(model, machine, predicted, joints, 1.0)
+    # Equations and MuJoCo agree to the order of both integrators.
+    np.testing.assert_allclose(ghost.positions["arm_2"], whole.positions["arm_2"], atol=1e-5)
+
+
+def test_the_ghost_of_a_body_turns_as_its_fixed_directions_say():
+    ready = mission.assemble(mission.load_scenario("burkov-body-vectors", ("duration=3.0",)))
+    model, machine = ready.mujoco.model.ptr, ready.machine
+    measured, predicted = ready.fly(), ready.fly("reduced")
+    assert frames.read_joints(model, predicted) == []
+    assert set(frames.orientation(predicted)) == {"directions"}
+    simulated = frames.simulated(model, machine, measured, 1.0)
+    rest = frames.at_rest(model, machine)
+    ghost = frames.bus_alone(machine, rest, predicted, simulated, measured, 1.0)
+    turns = [
+        Rotation.from_quat(found.quaternions[BUS], scalar_first=True)
+        for found in (simulated, ghost)
+    ]
+    # Both plants integrate the same equations of motion.
+    assert (turns[0].inv() * turns[1]).magnitude().max() < 1e-5
+    assert turns[0].magnitude().max() > 0.1
+
+
+def test_what_no_reading_places_has_no_orientation():
+    nothing = Trajectory(time=np.zeros(2), signals={"joint": np.zeros(2)}, units={})
+    assert frames.orientation(nothing) == {}
+
+
+@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3).map(np.array))
+def test_matrices_become_the_quaternions_of_scipy(vector):
+    rotation = Rotation.from_rotvec(vector)
+    ours = frames.of_matrix(rotation.as_matrix()[None])[0]
+    theirs = rotation.as_quat(scalar_first=True)
+    assert min(np.abs(ours - theirs).max(), np.abs(ours + theirs).max()) < 1e-12  # rounding
 
 
 vectors = st.lists(st.floats(-3, 3), min_size=3, max_size=3).map(np.array)

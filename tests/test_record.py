@@ -7,7 +7,7 @@ import pytest
 import rrd
 from scipy.spatial.transform import Rotation
 
-from spacecraft_sim import cli, mission, record, run_folder, simulate
+from spacecraft_sim import beneath, cli, mission, record, run_folder, simulate
 from spacecraft_sim.trajectory import Trajectory, moving_axes, selected
 
 NAME, DURATION = "efremov-nonlocal", 60.0  # the pulses, and 11 s of the relay
@@ -127,13 +127,20 @@ def test_the_last_drawn_tip_is_the_last_reading_times_the_stated_factor(flown):
 
 
 def test_the_bound_is_a_band_over_the_whole_flight(flown):
-    band = flown[1]["/bound/angle"]
+    band = flown[1]["/Bounds/0_quasi_rigid_angle_z"]
     edges = band.array("Scalars:scalars")[:, 0]
     assert set(edges) == {-0.007, 0.007}
     assert np.all(edges[1:] == -edges[:-1])  # from edge to edge, so that it is filled
     assert band.time[0] == 0.0
     assert band.time[-1] == pytest.approx(DURATION)
     assert len(edges) > 1000  # more than a plot has columns
+
+
+def test_bounds_lie_beneath_all_that_they_bound(flown):
+    paths = [p for p, entity in flown[1].items() if "SeriesLines:names" in entity.static]
+    bounds = [p for p in paths if p.startswith("/Bounds/")]
+    # The viewer draws lines over each other in the order of their paths.
+    assert sorted(paths)[: len(bounds)] == sorted(bounds)
 
 
 def test_events_tell_switchings_levels_and_verdicts(flown):
@@ -199,7 +206,7 @@ def written(path, short, sizes):
     ready, measured, predicted = short
     subject = run_folder.subject(ready)
     with record.Recording(subject, path) as recording:
-        recording.expect(record.reduced(subject, predicted))
+        recording.expect(beneath.reduced(subject, predicted))
         k = 0
         while k < len(measured.time):
             size = sizes[k % len(sizes)]
@@ -306,3 +313,36 @@ def test_all_machines_can_be_recorded(settings, tmp_path, capsys):
     thrusters = {name for name in flight.signals if f"{name}_command" in flight.signals}
     for name in thrusters:
         assert f"/relay/{name}/delivered" in entities
+
+
+@pytest.mark.parametrize(
+    ("name", "view", "signals"),
+    [
+        ("burkov-position", "joint_angle", ["joint_1", "joint_2"]),
+        ("burkov-body-vectors", "direction", [f"s{k}_{axis}" for k in (2, 3) for axis in "xyz"]),
+    ],
+)
+def test_machines_with_torques_that_follow_show_what_they_read(
+    name, view, signals, tmp_path, capsys
+):
+    out = tmp_path / "out"
+    assert fly(out, "duration=1.5", name=name) in (0, 1), capsys.readouterr().err
+    entities = rrd.read(out / "recording.rrd")
+    for key, file in (("simulated", "trajectory"), ("reduced", "reduced")):
+        entity, flight = entities[f"/{view}/{key}"], Trajectory.load(out / f"{file}.parquet")
+        # Every fiftieth of a second a row, those there are, and the last.
+        assert np.diff(entity.time).max() < 0.04
+        rows = np.searchsorted(flight.time, entity.time - NANOSECOND)
+        wanted = np.stack([flight[signal][rows] for signal in signals], axis=1)
+        np.testing.assert_array_equal(entity.array("Scalars:scalars"), wanted)
+        assert entity.time[-1] == flight.time[-1] == 1.5
+    # Such a torque has no states, and its changes are no events.
+    assert not any(path.startswith("/relay/") for path in entities)
+    texts = [text for (text,) in entities["/events"].values["TextLog:text"]]
+    assert all(text.startswith("claim ") for text in texts)
+    assert any(path.startswith("/thrust/") for path in entities)
+
+
+def test_an_hour_of_flight_takes_less_than_150_megabytes(flown):
+    size = (flown[0] / "recording.rrd").stat().st_size
+    assert size / DURATION * 3600 < 150e6

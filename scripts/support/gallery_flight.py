@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from spacecraft_sim import mission, record, run_folder
+from spacecraft_sim import beneath, mission, record, run_folder
 from support import gallery_page
 
 
@@ -29,8 +29,8 @@ def fly(name: str, duration: float | None, out: Path) -> gallery_page.Card:
     run_folder.write_flights(folder, ready.scenario, measured, predicted)
     run_folder.write_verdicts(folder, ready, comparison)
     subject = run_folder.subject(ready)
-    beneath = record.reduced(subject, predicted)
-    record.write(folder / "recording.rrd", subject, measured, beneath, comparison.verdicts)
+    below = beneath.reduced(subject, predicted)
+    record.write(folder / "recording.rrd", subject, measured, below, comparison.verdicts)
     run_folder.write_pictures(folder, ready, measured, predicted, comparison)
     gallery_page.shrink(folder / "summary.png", out / f"{name}.png")
     law = ready.scenario.controller["law"]

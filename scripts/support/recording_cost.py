@@ -5,7 +5,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from spacecraft_sim import mission, record, run_folder
+from spacecraft_sim import beneath, mission, record, run_folder
 from support.flight_cost import FLAGSHIP, seconds, spread
 
 HOUR, MEGABYTE = 3600.0, 1e6
@@ -49,6 +49,6 @@ def recording(*, duration: float, rounds: int) -> None:
 def _record(ready: mission.Mission, path: Path) -> None:
     subject = run_folder.subject(ready)
     with record.Recording(subject, path) as recording:
-        recording.expect(record.reduced(subject, ready.fly("reduced")))
+        recording.expect(beneath.reduced(subject, ready.fly("reduced")))
         ready.fly(watch=recording.take)
         recording.conclude(())
