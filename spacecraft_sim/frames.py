@@ -19,8 +19,8 @@ from spacecraft_sim.trajectory import Trajectory, selected
 
 Array = np.ndarray
 
-SPACING = 0.1  # time between two frames, s, of which a flight has MANY at least
-MANY = 1000
+SPACING = 0.1  # time between two frames, s, of which a flight has some, and not too many
+FEWEST, MOST = 1000, 18_000
 FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 POINTS = 9  # of the ghost's booms
 
@@ -71,7 +71,8 @@ def spacing(flight: Trajectory) -> float:
     Args:
         flight: The flight.
     """
-    return min(SPACING, float(flight.time[-1]) / MANY) or SPACING
+    end = float(flight.time[-1])
+    return min(max(SPACING, end / MOST), end / FEWEST) or SPACING
 
 
 def thinned(part: Trajectory, every: float) -> Trajectory:
