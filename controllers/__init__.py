@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from controllers import (
     burkov,
+    dwell_relay,
     efremov,
     efremov_observer,
     ivanova_sokolov,
@@ -25,6 +26,7 @@ REGISTRY: dict[str, Design] = {
     "burkov_body_vectors": burkov.body_vectors,
     "burkov_permanent_rotation": burkov.permanent_rotation,
     "burkov_two_torques": burkov.two_torques,
+    "dwell_relay": dwell_relay.design,
     "efremov_local": efremov.design_local,
     "efremov_nonlocal": efremov.design_nonlocal,
     "efremov_observed": efremov_observer.design_observed,

@@ -62,3 +62,17 @@ def channel(
         unit=model.gain(name, f"quasi_rigid_rate_{axis}"),
         spec=thrusters[name] if thrusters else None,
     )
+
+
+def torque_gain(model: ReducedModel, axis: Axis) -> float:
+    """Returns the acceleration of the rigid machine at a torque of 1 N m about an axis, rad/s^2.
+
+    Args:
+        model: The plant.
+        axis: The axis.
+    """
+    name = f"disturbance_{axis}"
+    if name in model.inputs:
+        return model.gain(name, f"quasi_rigid_rate_{axis}")
+    turning = {"x": -3, "y": -2, "z": -1}[axis]  # rotations come last
+    return 1 / float(model.inertia[turning])

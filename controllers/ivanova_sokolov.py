@@ -25,7 +25,7 @@ import math
 from functools import partial
 from typing import Literal
 
-from controllers.axis import Axis, Channel, channel
+from controllers.axis import Axis, Channel, channel, torque_gain
 from controllers.contour import (
     Contour,
     contour,
@@ -123,7 +123,7 @@ def design(
     positive(disturbance=disturbance, **{"|bias|": abs(bias)}, zero=True)
     found = channel(model, thrusters, axis=axis, feedback=feedback)
     thrust, time = _thrust(found, level), _on_time(found, min_on_time)
-    gain = _torque_gain(model or double_integrator(), axis)
+    gain = torque_gain(model or double_integrator(), axis)
     u0 = thrust * abs(found.unit)
     F, eps, scale = to_dimensionless(
         thrust_acceleration=u0,
@@ -239,15 +239,6 @@ def _on_time(found: Channel, min_on_time: float | None) -> float:
             "controller.min_on_time to what the law shall keep"
         )
     return time
-
-
-def _torque_gain(model: ReducedModel, axis: Axis) -> float:
-    """Acceleration of the rigid machine at a torque of 1 N m about the axis, rad/s^2."""
-    name = f"disturbance_{axis}"
-    if name in model.inputs:
-        return model.gain(name, f"quasi_rigid_rate_{axis}")
-    turning = {"x": -3, "y": -2, "z": -1}[axis]  # rotations come last
-    return 1 / float(model.inertia[turning])
 
 
 def _switching(

@@ -6,6 +6,9 @@ F = M1/M0 the constant disturbance.  That says nothing where F + e >= 1; feedbac
 angle theta + H q/J always says something: the elastic moment falls out of its equation, and
 |theta| <= p0(F, 0) u0 dwell^2 + sup |H q|/J.
 
+Where products of inertia turn one axis with another, H, M0/J and e are those of J^-1 H and J^-1 M:
+the same where J is diagonal.
+
 Source: Sokolov (2004), (26), (27); Ivanova & Sokolov (1999) for regulators with an off state;
 Efremov, Polyakov & Strygin (2006), (1.6), for the quasi-rigid angle.
 """
@@ -16,36 +19,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spacecraft_sim import dwell_accuracy
 from spacecraft_sim.checks import positive
-from spacecraft_sim.elastic_influence import Influence, influence, least_dwell
+from spacecraft_sim.dwell_axes import Accuracy, Band, RelayAxis, coupled
+from spacecraft_sim.elastic_influence import Influence, influence
 from spacecraft_sim.elastic_modes import ElasticModel
 from spacecraft_sim.guarantee import Assumption
 from spacecraft_sim.relay_channels import AXES, per_channel
+from spacecraft_sim.remedy import Lighter, Remedy, remedies
+from spacecraft_sim.small_motion import slow_rotation, small_deflection
 
 Array = np.ndarray
-Accuracy = Callable[[float, float], float]  # p0 of (F, e); raises ValueError where there is none
+Regulator = Callable[[float, float], float]  # p0 of (F, e); raises ValueError where there is none
 
-TWO_LEVEL = "two levels"
-SMALL_ANGLE = 0.15  # rad; measured over bound passes 1 at 0.19 rad on the shipped machines
-_SLOW = (
-    0.01  # what is left out grows with the rate: at this one the bound is passed by 4 % at worst
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Remedy:
-    """What would make a vacuous guarantee say something, the rest unchanged.
-
-    Attributes:
-        dwell: The least dwell, s; inf if none is long enough.
-        damping: The least factor on the damping of all elastic parts; inf if none is enough.
-        fraction: The largest share of the inertia that may move elastically, by one mode.
-    """
-
-    dwell: float
-    damping: float
-    fraction: float
+NOTHING = Accuracy(contour=math.inf)
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,16 +44,20 @@ class AxisCertificate:
         torque: M0, N m.
         dwell: Least time between switchings, s.
         bias: F = M1/M0.
-        inertia: J, kg m^2.
+        inertia: J, kg m^2; of the bus free about the other axes, where products couple them.
         moment: M_e by the printed bound, N m; inf if it is refused.
         moment_l1: M_e for any switching, N m.
-        disturbance: e, the smaller of both over M0.
-        accuracy: What each regulator guarantees by its name, rad; inf where it says nothing.
-        quasi_rigid: What feedback of the quasi-rigid angle guarantees, rad.
-        sampling: What sampled switching adds, u0 dwell h, rad.
+        refused: Why the printed bound is, or nothing.
+        joint: The elastic coordinate that is bent farthest, over what it must be small beside.
+        deflection: The smaller bound of it, A_m or that for any switching, rad or m.
+        disturbance: e: the smaller M_e over M0, and what the torques of the other axes add.
+        attitude: What the two-level relay guarantees on the attitude; inf where nothing.
+        quasi_rigid: What it guarantees of the attitude on the quasi-rigid angle.
+        sway: Bound of |(J^-1 H q')_e|, how far the rate is from the quasi-rigid rate, rad/s.
+        others: What other regulators guarantee in continuous time, alone, rad, by name.
         inertia_fraction: mu, the share of the inertia that moves elastically.
-        decay: Of the mode that disturbs the axis most, 1/s.
-        remedy: What would help; None where the bound of attitude feedback is finite.
+        decay: sigma of the mode that disturbs the axis most, 1/s.
+        remedy: What would help; None where the attitude is guaranteed.
         assumptions: What all this rests on, with values.
     """
 
@@ -77,28 +68,37 @@ class AxisCertificate:
     inertia: float
     moment: float
     moment_l1: float
+    refused: str
+    joint: str
+    deflection: float
     disturbance: float
-    accuracy: dict[str, float]
-    quasi_rigid: float
-    sampling: float
+    attitude: Accuracy
+    quasi_rigid: Accuracy
+    sway: float
+    others: dict[str, float]
     inertia_fraction: float
     decay: float
     remedy: Remedy | None
     assumptions: tuple[Assumption, ...]
 
     @property
-    def best(self) -> float:
-        """The best that feedback of the attitude guarantees, rad; inf if nothing."""
-        return min(self.accuracy.values())
+    def holds(self) -> bool:
+        """Whether the attitude is guaranteed and every assumption holds."""
+        return math.isfinite(self.attitude.total) and all(a.holds for a in self.assumptions)
 
     @property
     def why(self) -> str:
-        """Why attitude feedback guarantees nothing, or as much as it does, in one line."""
-        mu, swing = self.inertia_fraction, 2 * self.inertia_fraction / (1 - self.inertia_fraction)
-        lost = -math.expm1(-self.decay * self.dwell)
+        """Why feedback of the attitude guarantees something or nothing, in one line."""
+        if self.moment_l1 == 0:
+            return "nothing elastic is felt in the linear theory: e = 0"
+        mu, room = self.inertia_fraction, 1 - abs(self.bias)
+        swing, lost = 2 * mu / (1 - mu), -math.expm1(-self.decay * self.dwell) * room
+        sign, one = ("<" if a < b else ">=" for a, b in ((self.disturbance, room), (swing, lost)))
+        share = "" if self.bias == 0 else f"{room:.4g} "
         return (
-            f"one mode: 2 mu/(1 - mu) = {swing:.4g} {'<' if swing < lost else '>='} "
-            f"1 - exp(-sigma dwell) = {lost:.4g} with mu = {mu:.4g}, sigma = {self.decay:.4g} 1/s"
+            f"e = {self.disturbance:.4g} {sign} 1 - |F| = {room:.4g}; by one mode: 2 mu/(1 - mu) = "
+            f"{swing:.4g} {one} {share}(1 - exp(-sigma dwell)) = {lost:.4g} with mu = {mu:.4g}, "
+            f"sigma = {self.decay:.4g} 1/s"
         )
 
 
@@ -109,7 +109,9 @@ def certify(
     dwell: float | Array | list[float],
     disturbance: float | Array | list[float] = 0.0,
     timestep: float = 0.0,
-    regulators: Mapping[str, Accuracy] | None = None,
+    delay: float | Array | list[float] = 0.0,
+    regulators: Mapping[str, Regulator] | None = None,
+    lighter: Lighter | None = None,
 ) -> tuple[AxisCertificate, ...]:
     """Certifies the pointing accuracy about each axis.
 
@@ -119,7 +121,9 @@ def certify(
         dwell: Least time between switchings of each channel or of all, s.
         disturbance: M1, constant torque on the bus about each axis or all, of either sign, N m.
         timestep: Sampling period of the regulator, s; 0 for continuous time.
+        delay: Longest delay of the thrust of each channel or of all, s.
         regulators: p0(F, e) by name beside the two-level relay.
+        lighter: Gives the structure with the masses of its elastic parts times a factor.
 
     Returns:
         One certificate an axis.
@@ -129,57 +133,147 @@ def certify(
     """
     M0, hold = per_channel("torque", torque), per_channel("dwell", dwell)
     positive(timestep=timestep, zero=True)
-    M1 = np.broadcast_to(np.asarray(disturbance, dtype=float), (3,))
+    late = timestep + per_channel("delay", delay, zero=True)
+    M1 = _steady(disturbance, M0)
+    found = influence(elastic, torque=M0, dwell=hold)
+    products, room = _products(elastic, M0, M1), 1 - np.abs(M1) / M0
+
+    def disturbances(structure: ElasticModel) -> Array:
+        """The bound e about each axis."""
+        return influence(_of_acceleration(structure), torque=M0, dwell=hold).bound / M0 + products
+
+    e, lean = disturbances(elastic), _leans(elastic, found, M1)
+    inverse = np.diag(_inverse(elastic))
+    full = {
+        name: RelayAxis(
+            acceleration=float(M0[k] * inverse[k]),
+            inertia=float(1 / inverse[k]),
+            dwell=float(hold[k]),
+            bias=float(M1[k] / M0[k]),
+            disturbance=float(e[k]),
+            late=float(late[k]),
+        )
+        for k, name in enumerate(AXES)
+    }
+    sway = [found.bending_rate(row) for row in elastic.G.T]
+    quasi = {
+        name: replace(axis, disturbance=float(products[k]), lean=float(lean[k]), sway=sway[k])
+        for k, (name, axis) in enumerate(full.items())
+    }
+    bands, rigid = _bands(full), _bands(quasi)
+    bent = _deflections(elastic, found, M1)
+    worst = int(np.argmax(bent / elastic.scale))
+    rate = max(band.rate for band in (*bands.values(), *rigid.values()) if band)
+    shared = _assumptions(elastic, found, bent, rate)
+    helps = remedies(
+        _of_acceleration(elastic),
+        torque=M0,
+        limits=(room - products) * M0,
+        axes=[k for k, name in enumerate(AXES) if bands[name] is None],
+        holds=lambda structure: disturbances(structure) < room,
+        lighter=lighter,
+    )
+    return tuple(
+        AxisCertificate(
+            axis=name,
+            torque=float(M0[k]),
+            dwell=axis.dwell,
+            bias=axis.bias,
+            inertia=axis.inertia,
+            moment=float(found.moment[k]),
+            moment_l1=float(found.moment_l1[k]),
+            refused=found.refused,
+            joint=elastic.coordinates[worst],
+            deflection=float(bent[worst]),
+            disturbance=axis.disturbance,
+            attitude=_accuracy(bands[name]),
+            quasi_rigid=_accuracy(rigid[name]),
+            sway=sway[k],
+            others={
+                law: axis.length * _or_inf(p0, abs(axis.bias), axis.disturbance)
+                for law, p0 in (regulators or {}).items()
+            },
+            inertia_fraction=float(elastic.inertia_fraction[k]),
+            decay=_decay(elastic, found, k),
+            remedy=helps.get(k),
+            assumptions=(*shared, *_lateness(axis)),
+        )
+        for k, (name, axis) in enumerate(full.items())
+    )
+
+
+def _steady(disturbance: float | Array | list[float], M0: Array) -> Array:
+    given = np.asarray(disturbance, dtype=float)
+    if given.shape not in ((), (3,)) or not np.all(np.isfinite(given)):
+        raise ValueError(f"disturbance must be one finite number or three, got {disturbance!r}")
+    M1 = np.broadcast_to(given, (3,))
     for name, thrust, steady in zip(AXES, M0, M1, strict=True):
         if not abs(steady) < thrust:
             raise ValueError(
                 f"the constant disturbance about {name}, {steady:.6g} N m, must be below the "
                 f"torque, {thrust:.6g} N m: no regulator holds the axis"
             )
-    found = influence(elastic, torque=M0, dwell=hold)
-    rules = {TWO_LEVEL: dwell_accuracy.guaranteed_accuracy, **(regulators or {})}
-    return tuple(_certified(elastic, found, k, float(M1[k]), timestep, rules) for k in range(3))
+    return M1
 
 
-def _certified(
-    elastic: ElasticModel,
-    found: Influence,
-    k: int,
-    steady: float,
-    timestep: float,
-    rules: Mapping[str, Accuracy],
-) -> AxisCertificate:
-    M0, dwell, J = float(found.torque[k]), float(found.dwell[k]), float(elastic.J[k, k])
-    F, e = steady / M0, float(found.bound[k]) / M0
-    length = M0 / J * dwell**2
-    accuracy = {name: length * _or_inf(rule, abs(F), e) for name, rule in rules.items()}
-    row = elastic.H[k] / J
-    swing = min(found.deflection(row), found.deflection_l1(row))
-    mu = float(elastic.inertia_fraction[k])
-    decay = _decay(elastic, found, k)
-    vacuous = math.isinf(min(accuracy.values()))
-    return AxisCertificate(
-        axis=AXES[k],
-        torque=M0,
-        dwell=dwell,
-        bias=F,
-        inertia=J,
-        moment=float(found.moment[k]),
-        moment_l1=float(found.moment_l1[k]),
-        disturbance=e,
-        accuracy=accuracy,
-        quasi_rigid=length * dwell_accuracy.guaranteed_accuracy(F, 0.0) + swing,
-        sampling=M0 / J * dwell * timestep,
-        inertia_fraction=mu,
-        decay=decay,
-        remedy=_remedy(elastic, found, k, F, mu, decay) if vacuous else None,
-        assumptions=_assumptions(elastic, found, k, timestep),
-    )
+def _inverse(elastic: ElasticModel) -> Array:
+    """J^-1, with products of inertia that are rounding left out."""
+    scale = np.sqrt(np.outer(np.diag(elastic.J), np.diag(elastic.J)))
+    J = np.where(np.abs(elastic.J) > _ROUNDING * scale, elastic.J, 0.0)
+    return np.diag(1 / np.diag(J)) if np.array_equal(J, np.diag(np.diag(J))) else np.linalg.inv(J)
 
 
-def _or_inf(rule: Accuracy, F: float, e: float) -> float:
+def _products(elastic: ElasticModel, M0: Array, M1: Array) -> Array:
+    """What the torques of the other axes do to each by products of inertia, over its own thrust."""
+    inverse = _inverse(elastic)
+    others = np.abs(inverse - np.diag(np.diag(inverse)))
+    return others @ (M0 + np.abs(M1)) / (np.diag(inverse) * M0)
+
+
+def _of_acceleration(elastic: ElasticModel) -> ElasticModel:
+    """The structure with J_e (J^-1 H)_e for H_e: what an axis of the free bus feels."""
+    inverse = _inverse(elastic)
+    if np.array_equal(inverse, np.diag(np.diag(inverse))):
+        return elastic
+    return replace(elastic, H=(elastic.G / np.diag(inverse)).T)
+
+
+def _deflections(elastic: ElasticModel, found: Influence, M1: Array) -> Array:
+    """Bounds of |q|: about rest, and from rest to where the constant disturbance holds it."""
+    swings = [
+        min(found.deflection(row), found.deflection_l1(row)) for row in np.eye(len(elastic.D))
+    ]
+    return np.array(swings) + np.abs(found.modes.deflection @ M1)
+
+
+def _leans(elastic: ElasticModel, found: Influence, M1: Array) -> Array:
+    """Bounds of (J^-1 H q)_e, rad: how far the attitude is from the quasi-rigid angle."""
+    swings = [min(found.deflection(row), found.deflection_l1(row)) for row in elastic.G.T]
+    return np.array(swings) + np.abs(elastic.G.T @ found.modes.deflection @ M1)
+
+
+def _bands(axes: Mapping[str, RelayAxis]) -> dict[str, Band | None]:
+    """Contours of the axes that have one; an axis without one may turn the others at will."""
+    held = {n: a for n, a in axes.items() if abs(a.bias) + a.disturbance < 1}
     try:
-        return rule(F, e)
+        found, loose = coupled(held), len(held) < len(axes)
+    except ValueError:  # each has a contour, but they turn each other too fast for it
+        found, loose = {n: coupled({n: a})[n] for n, a in held.items()}, True
+    if loose:
+        found = {
+            n: replace(band, accuracy=replace(band.accuracy, coupling=math.inf))
+            for n, band in found.items()
+        }
+    return {n: found.get(n) for n in axes}
+
+
+def _accuracy(band: Band | None) -> Accuracy:
+    return band.accuracy if band else NOTHING
+
+
+def _or_inf(p0: Regulator, F: float, e: float) -> float:
+    try:
+        return p0(F, e)
     except ValueError:  # it guarantees nothing there
         return math.inf
 
@@ -190,75 +284,26 @@ def _decay(elastic: ElasticModel, found: Influence, k: int) -> float:
     return float(-found.modes.eigenvalues[int(np.argmax(part))].real)
 
 
-def _remedy(
-    elastic: ElasticModel, found: Influence, k: int, F: float, mu: float, decay: float
-) -> Remedy:
-    limit = float(found.torque[k]) * (1 - abs(F))
-
-    def moment(factor: float) -> float:
-        damped = replace(elastic, B=factor * elastic.B)
-        return float(influence(damped, torque=found.torque, dwell=found.dwell).bound[k])
-
-    return Remedy(
-        dwell=least_dwell(elastic, torque=found.torque, axis=k, limit=limit),
-        damping=_least_factor(moment, limit),
-        fraction=dwell_accuracy.one_mode_largest_fraction(
-            decay=decay, dwell=float(found.dwell[k]), bias=F
-        ),
-    )
-
-
-def _least_factor(moment: Callable[[float], float], limit: float, highest: float = 1e4) -> float:
-    """The least factor above 1 with a moment below the limit, to 1 %; inf beyond `highest`."""
-    high = 2.0
-    while moment(high) >= limit:
-        high *= 2
-        if high > highest:
-            return math.inf
-    low = high / 2
-    while high > low * 1.01:
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if moment(middle) < limit else (middle, high)
-    return high
-
-
 def _assumptions(
-    elastic: ElasticModel, found: Influence, k: int, timestep: float
+    elastic: ElasticModel, found: Influence, bent: Array, rate: float
 ) -> tuple[Assumption, ...]:
-    """Small motion, slow rotation and sampling, as far as the design can tell."""
-    n = len(elastic.D)
-    travel = np.full(n, np.inf) if elastic.travel is None else elastic.travel
-    largest = [min(found.deflection(row), found.deflection_l1(row)) for row in np.eye(n)]
-    worst = int(np.argmax(largest))
-    tight = int(np.argmin(travel - largest))
-    # A limit cycle turns at u0 dwell/2 at most, a bias may double that.
-    J = np.diag(elastic.J)
-    rate = found.torque * found.dwell / J
-    a, b = (i for i in range(3) if i != k)
-    gyroscopic = abs(J[a] - J[b]) * rate[a] * rate[b] / float(found.torque[k])
-    slowest = float(np.min(np.abs(found.eigenvalues)))
+    """Small motion and slow rotation, as far as the design can tell."""
+    assert elastic.scale is not None
+    assert elastic.travel is not None
+    worst, tight = int(np.argmax(bent / elastic.scale)), int(np.argmin(elastic.travel - bent))
     listed = [
-        Assumption(
-            text=f"small motion: deflection of {elastic.coordinates[worst]}",
-            value=largest[worst], limit=SMALL_ANGLE, unit="rad",
-        ),
-        Assumption(text="slow rotation: gyroscopic torque over M0", value=gyroscopic, limit=_SLOW),
-        Assumption(
-            text="slow rotation: rate over the slowest elastic frequency",
-            value=float(rate.max()) / slowest, limit=_SLOW,
-        ),
-    ]  # fmt: skip
-    if math.isfinite(travel[tight]):
-        name = elastic.coordinates[tight]
-        text = f"{name} stays off its stop"
-        listed.append(
-            Assumption(text=text, value=largest[tight], limit=float(travel[tight]), unit="rad")
-        )
-    if timestep:
-        listed.append(
-            Assumption(
-                text="sampling period within the dwell", value=timestep,
-                limit=float(found.dwell[k]), relation="<=", unit="s",
-            )
-        )  # fmt: skip
+        small_deflection(elastic.coordinates[worst], float(bent[worst] / elastic.scale[worst])),
+        slow_rotation(rate, found.modes.slowest_decay),
+    ]
+    if math.isfinite(elastic.travel[tight]):
+        text = f"{elastic.coordinates[tight]} stays off its stop"
+        limit = float(elastic.travel[tight])
+        listed.append(Assumption(text=text, value=float(bent[tight]), limit=limit, unit="rad or m"))
     return tuple(listed)
+
+
+def _lateness(axis: RelayAxis) -> tuple[Assumption, ...]:
+    if not axis.late:
+        return ()
+    text = "sampling period and delay within the dwell"
+    return (Assumption(text=text, value=axis.late, limit=axis.dwell, relation="<=", unit="s"),)

@@ -1,6 +1,7 @@
-"""The command `spacecraft-sim`: list, explain, run, compare, repair, export, video, doctor.
+"""The command `spacecraft-sim`: flights, and what is done beside them.
 
 Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or bad input, 3 the run diverged or crashed.
+A certificate holds if the attitude is guaranteed about each axis and every assumption holds.
 Heavy modules are imported by the commands that need them.
 """
 
@@ -103,6 +104,16 @@ def _parser() -> argparse.ArgumentParser:
     video.add_argument("--speed", type=float, help="simulated over shown time; default: about 30 s")
     video.add_argument("--out", type=Path, metavar="FILE", help=".webp or .mp4 file to write")
     command(cli_tools.doctor, "say what this machine can do, what is missing, and what to install")
+    certify = command(
+        cli_tools.certify, "guaranteed pointing accuracy of a machine with elastic parts"
+    )
+    what = "spacecraft, path of its TOML, or any MJCF file.xml with a free joint"
+    certify.add_argument("name", metavar="NAME", help=what)
+    for key, unit, words in cli_tools.CERTIFIED:
+        certify.add_argument(f"--{key}", type=float, nargs="+", metavar=unit, help=words)
+    words = "sampling period of the regulator, s; continuous time if left out"
+    certify.add_argument("--timestep", type=float, default=0.0, metavar="s", help=words)
+    certify.add_argument("--out", type=Path, help="folder to write; default runs/NAME, numbered")
     return parser
 
 
@@ -146,22 +157,17 @@ def _explain(arguments: argparse.Namespace) -> int:
     law = REGISTRY[scenario.controller["law"]]
     for heading, rows in explain.parameters(scenario, mission.machine, law):
         table = Table("parameter", "value", "default", "unit", "what", title=heading, box=None)
-        _fill(table, rows)
+        terminal.fill(table, rows)
         console.print(table)
     claims = Table(
         "claim", "theory", "bound", "unit", "source", title="what theory predicts", box=None
     )
-    _fill(claims, explain.predictions(mission.guarantees))
+    terminal.fill(claims, explain.predictions(mission.guarantees))
     console.print(claims)
     console.print("[bold]assumptions that the design decides[/]")
     for line in explain.assumptions(mission.guarantees):
         console.print(f"  {line}", highlight=False)
     return HOLDS
-
-
-def _fill(table: Table, rows: Sequence[Sequence[str]]) -> None:
-    for row in rows:
-        table.add_row(*row)
 
 
 # -- run -------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Commands beside the flight itself: compare, repair, margins, export, video, doctor."""
+"""Commands beside the flight itself: compare, repair, margins, certify, export, video, doctor."""
 
 import argparse
 import math
@@ -12,7 +12,7 @@ from rich.progress import MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from spacecraft_sim import terminal
-from spacecraft_sim.terminal import HOLDS
+from spacecraft_sim.terminal import FAILS, HOLDS
 from spacecraft_sim.versions import require_supported_mujoco
 
 if TYPE_CHECKING:
@@ -118,6 +118,62 @@ def _flights(arguments: argparse.Namespace) -> "Callable[[float], Mission]":
         return mission.assemble(mission.load_scenario(arguments.name, settings))
 
     return limited
+
+
+# -- certify ---------------------------------------------------------------------------------------
+
+# Options of one number for all axes or three, for x, y and z.
+CERTIFIED = (
+    ("torque", "N_m", "torque of the channels; that of the thrusters if left out"),
+    ("dwell", "s", "least time between switchings; the minimum on-times if left out"),
+    ("delay", "s", "longest delay of the thrust; that of the thrusters if left out"),
+    ("disturbance", "N_m", "constant torques on the bus; none if left out"),
+)
+
+
+def certify(arguments: argparse.Namespace) -> int:
+    """Certifies the pointing accuracy of a machine with elastic parts.
+
+    Args:
+        arguments: Words of the command.
+
+    Returns:
+        The exit code.
+    """
+    require_supported_mujoco()
+    from controllers.contour import guaranteed_accuracy
+    from spacecraft_sim import certificate_curves, certificate_input, certificate_report, run_folder
+    from spacecraft_sim.certificate import certify as certified
+    from spacecraft_sim.elastic_mjcf import elastic_model, with_elastic_masses
+
+    craft = certificate_input.read(
+        arguments.name, torque=arguments.torque, dwell=arguments.dwell, delay=arguments.delay
+    )
+    elastic = elastic_model(craft.model)
+    certificates = certified(
+        elastic,
+        torque=craft.torque,
+        dwell=craft.dwell,
+        disturbance=certificate_input.steady(arguments.disturbance),
+        timestep=arguments.timestep,
+        delay=craft.delay,
+        regulators={"thrust against M1 alone, Ivanova & Sokolov": guaranteed_accuracy},
+        lighter=lambda factor: elastic_model(with_elastic_masses(craft.model, factor)),
+    )
+    folder = run_folder.create(arguments.out, f"certificate-{craft.name}")
+    curves = certificate_curves.curves(craft.model, elastic, torque=craft.torque, dwell=craft.dwell)
+    certificate_report.write(folder, craft, certificates, curves)
+    console = terminal.console()
+    table = Table("", "x", "y", "z", title=f"{craft.name}: {craft.title}", box=None)
+    terminal.fill(table, certificate_report.rows(certificates, curves))
+    console.print(table)
+    for line in certificate_report.explanations(certificates):
+        console.print(line, highlight=False)
+    console.print("[bold]assumptions[/]")
+    for line in certificate_report.assumptions(certificates):
+        console.print(f"  {line}", highlight=False)
+    console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
+    return HOLDS if all(c.holds for c in certificates) else FAILS
 
 
 # -- export ----------------------------------------------------------------------------------------

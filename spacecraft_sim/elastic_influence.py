@@ -99,6 +99,20 @@ class Influence:
         swing = self._row(direction) @ self.modes.residues  # (k, 3); q = 0 at the step
         return float(total_variation(self.modes.eigenvalues, swing) @ self.torque)
 
+    def bending_rate(self, direction: Array | list[float]) -> float:
+        """Returns the smaller bound of |(direction, q')|, rad/s or m/s.
+
+        Args:
+            direction: l, coefficients of the elastic coordinates, shape (n,).
+
+        Raises:
+            ValueError: If the direction has another number of coefficients.
+        """
+        eigenvalues = self.modes.eigenvalues
+        swing = eigenvalues[:, None] * (self._row(direction) @ self.modes.residues)  # (k, 3)
+        printed = _printed(eigenvalues, swing, self.torque, self.dwell)
+        return float(min(printed, total_variation(eigenvalues, swing) @ self.torque))
+
     def _row(self, direction: Array | list[float]) -> Array:
         row, n = np.asarray(direction, dtype=float), len(self.modes.deflection)
         if row.shape != (n,):

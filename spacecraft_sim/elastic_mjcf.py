@@ -10,6 +10,8 @@ the origin of the bus frame need not be the centre of mass.
 # pyright: reportAttributeAccessIssue=false, reportMissingImports=false
 # (MuJoCo is a compiled module without type stubs)
 
+import copy
+
 import mujoco
 import numpy as np
 
@@ -18,6 +20,7 @@ from spacecraft_sim.readings import undeformed_mass_matrix
 
 Array = np.ndarray
 
+_LEAST_LENGTH = 1e-3  # m: nothing that slides is nearer than that to the centre of mass
 _PROBE = 0.1  # rad or m, and per s: springs of joints are linear that far, others need not be
 
 
@@ -56,7 +59,35 @@ def elastic_model(model: mujoco.MjModel) -> ElasticModel:
         J=(J + J.T) / 2,
         coordinates=_coordinates(model),
         travel=_travel(model),
+        scale=_scale(model),
     )
+
+
+def with_elastic_masses(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
+    """Returns the model with other masses, and inertias, of all bodies that move elastically.
+
+    Springs and dampers stay as they are, and so does the bus with what is welded to it.
+
+    Args:
+        model: A compiled model as `elastic_model` takes it.
+        factor: What masses and inertias are multiplied by.
+    """
+    lighter = copy.copy(model)
+    moving = elastic_bodies(model)
+    lighter.body_mass[moving] *= factor
+    lighter.body_inertia[moving] *= factor
+    mujoco.mj_setConst(lighter, mujoco.MjData(lighter))
+    return lighter
+
+
+def elastic_bodies(model: mujoco.MjModel) -> Array:
+    """Returns the bodies that move elastically: all that are not welded to the bus.
+
+    Args:
+        model: A compiled model as `elastic_model` takes it.
+    """
+    bus = int(model.jnt_bodyid[0])
+    return np.flatnonzero((model.body_weldid != bus) & (model.body_rootid == bus))
 
 
 def _faults(model: mujoco.MjModel) -> list[str]:
@@ -185,6 +216,18 @@ def _travel(model: mujoco.MjModel) -> Array:
             least = high - turned if ball else min(at - low, high - at)
         travel += [least - model.jnt_margin[j]] * _width(model, j)
     return np.array(travel)
+
+
+def _scale(model: mujoco.MjModel) -> Array:
+    """1 rad for what turns; for what slides, how far its body is from the centre of mass, m."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    centre, scale = data.subtree_com[int(model.jnt_bodyid[0])], []
+    for j in _parts(model):
+        slides = model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE
+        away = np.linalg.norm(data.subtree_com[int(model.jnt_bodyid[j])] - centre)
+        scale += [max(float(away), _LEAST_LENGTH) if slides else 1.0] * _width(model, j)
+    return np.array(scale)
 
 
 def _parts(model: mujoco.MjModel) -> range:

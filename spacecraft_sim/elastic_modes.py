@@ -48,6 +48,8 @@ class ElasticModel:
         coordinates: Names of the elastic coordinates; q1, q2, ... by default.
         travel: Least deflection at which a coordinate meets a limit, shape (n,), rad or m; inf,
             the default, where there is none.
+        scale: What a deflection must be small beside, shape (n,): 1 rad, the default, or for what
+            slides its distance from the centre of mass, m.
     """
 
     D: Array
@@ -58,6 +60,7 @@ class ElasticModel:
     J: Array
     coordinates: tuple[str, ...] = ()
     travel: Array | None = None
+    scale: Array | None = None
 
     def __post_init__(self) -> None:
         n = len(self.D)
@@ -71,12 +74,17 @@ class ElasticModel:
         if n == 0:
             raise ValueError("there are no elastic coordinates: the bus is all there is")
         names = self.coordinates or tuple(f"q{k + 1}" for k in range(n))
-        travel = np.full(n, np.inf) if self.travel is None else np.array(self.travel, dtype=float)
-        if len(names) != n or travel.shape != (n,):
-            raise ValueError(f"{n} coordinates need {n} names and travels, got {names}, {travel}")
-        travel.flags.writeable = False
         object.__setattr__(self, "coordinates", names)
-        object.__setattr__(self, "travel", travel)
+        for name, default in (("travel", np.inf), ("scale", 1.0)):
+            given = getattr(self, name)
+            array = np.full(n, default) if given is None else np.array(given, dtype=float)
+            if len(names) != n or array.shape != (n,) or not np.all(array > 0):
+                raise ValueError(
+                    f"{n} coordinates need {n} names, and {n} travels and scales > 0; got {names}, "
+                    f"{name} = {array}"
+                )
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
         _refuse_indefinite(self)
 
     @property
@@ -110,6 +118,11 @@ class Modes:
     def overdamped(self) -> int:
         """How many eigenvalues are real."""
         return int(np.count_nonzero(np.imag(self.eigenvalues) == 0))
+
+    @property
+    def slowest_decay(self) -> float:
+        """Decay sigma of the slowest motion, 1/s."""
+        return float(-np.max(np.real(self.eigenvalues)))
 
     def accelerations(self, rows: Array) -> Array:
         """Returns the amplitudes of rows @ q'' after unit jumps, shape (k, m, 3), 1/(N m s^2).

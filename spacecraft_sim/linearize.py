@@ -71,7 +71,7 @@ def linearize(model: mujoco.MjModel) -> Linearization:
         M=undeformed_mass_matrix(model),
         D=np.diag(model.dof_damping) + _actuator_damping(model),
         K=np.diag(_dof_stiffness(model)),
-        B=_actuator_forces(model),
+        B=actuator_forces(model),
         C=C,
         y0=y0,
         outputs=outputs,
@@ -243,7 +243,12 @@ def _rigid_dofs(model: mujoco.MjModel) -> tuple[int, ...]:
     return tuple(range(start, start + int(model.body_dofnum[bus])))
 
 
-def _actuator_forces(model: mujoco.MjModel) -> Array:
+def actuator_forces(model: mujoco.MjModel) -> Array:
+    """Returns the generalised force of each actuator at unit control, shape (nv, nu).
+
+    Args:
+        model: A compiled model, at its reference configuration.
+    """
     data, B = mujoco.MjData(model), np.zeros((model.nv, model.nu))
     for i in range(model.nu):
         mujoco.mj_resetData(model, data)

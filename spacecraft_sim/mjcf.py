@@ -62,6 +62,23 @@ def _bus(spec: mujoco.MjSpec, spacecraft: Spacecraft):
     return bus
 
 
+def read(path: Path) -> mujoco.MjModel:
+    """Compiles any MJCF file as it stands.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ValueError: If it is missing or broken.
+    """
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file")
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except (ValueError, OSError) as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
 def motors(thruster: Thruster) -> tuple[str, ...]:
     """Returns the names of the MJCF actuators that a thruster channel fires together.
 

@@ -4,6 +4,7 @@ q'' = B_r u for the rigid coordinates, z' = lambda z + b u for each elastic eige
 in both.  The inputs are linear in time over a piece, for which the solution is a closed form.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -48,6 +49,15 @@ class ReducedModel:
     projection: Array
     neglected: Array
     inertia: Array
+
+    @property
+    def slowest_decay(self) -> float:
+        """Decay of the slowest elastic motion, 1/s; inf without elastic modes."""
+        k = len(self.frequencies)
+        if k == 0:
+            return math.inf
+        A = np.block([[np.zeros((k, k)), np.eye(k)], [-np.diag(self.frequencies**2), -self.D]])
+        return float(-np.max(np.real(np.linalg.eigvals(A))))
 
     def gain(self, channel: str, output: str) -> float:
         """Returns how fast a unit input accelerates a rate reading, neglecting elasticity.

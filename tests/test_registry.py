@@ -24,6 +24,7 @@ MACHINES = {
     "two_boom_3d": (353.3333, 2.0),
     "four_boom": (458.4533, 2.0),
     "asymmetric_booms": (309.7758, 2.0),
+    "two_boom_light": (258.3333, 2.0),
 }
 MODES = {"rigid_bus": 0}  # elastic modes of the reduced plant, where not two
 CLOSE = {"max_delay": 0.21, "accuracy": 0.007, "c": 0.31}  # Efremov et al. (2006), section 5

@@ -1,0 +1,119 @@
+"""Search for switchings, a disturbance and a spin that drive the elastic moment over its bound."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spacecraft_sim.attack import Schedule
+from spacecraft_sim.elastic_flight import longest_step
+from spacecraft_sim.elastic_influence import Influence
+from spacecraft_sim.elastic_modes import ElasticModel
+from spacecraft_sim.falsify import Found, falsify
+from spacecraft_sim.relay_channels import AXES
+
+Array = np.ndarray
+
+_COARSE = 3.0  # steps of the search over exact ones
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """Schedules as points of the box -1 <= x <= 1: signs, waits beyond the dwell, torque and spin.
+
+    Attributes:
+        torque: M0 of each channel, shape (3,), N m.
+        dwell: Least time between switchings of each, shape (3,), s.
+        wait: Longest time beyond the dwell, s.
+        switchings: Of each channel.
+        disturbance: Largest constant torque about each axis over M0.
+        spin: Largest rate about each axis at t = 0, rad/s.
+    """
+
+    torque: Array
+    dwell: Array
+    wait: float
+    switchings: int
+    disturbance: float
+    spin: float
+
+    @property
+    def variables(self) -> int:
+        """How many numbers make a schedule."""
+        return 3 * (1 + self.switchings) + 6
+
+    def schedule(self, x: Array) -> Schedule:
+        """Returns the schedule of a point.
+
+        Args:
+            x: The point, shape (variables,).
+        """
+        channels, extra = x[:-6].reshape(3, -1), x[-6:]
+        times, levels = [], []
+        for M0, held, (sign, *waits) in zip(self.torque, self.dwell, channels, strict=True):
+            times.append(np.cumsum(held + self.wait * (1 + np.array(waits)) / 2))
+            alternating = (-1.0) ** np.arange(self.switchings + 1)
+            levels.append((M0 if sign >= 0 else -M0) * alternating)
+        return Schedule(
+            switch_times=tuple(times),
+            levels=tuple(levels),
+            duration=float(max(at[-1] for at in times)) + self.wait,
+            disturbance=tuple((self.disturbance * self.torque * extra[:3]).tolist()),
+            spin=tuple((self.spin * extra[3:]).tolist()),
+        )
+
+
+def search(
+    model: Any,
+    elastic: ElasticModel,
+    found: Influence,
+    *,
+    axis: str,
+    evaluations: int,
+    rng: np.random.Generator,
+    switchings: int = 12,
+    disturbance: float = 0.0,
+    spin: float = 0.0,
+) -> tuple[Schedule, Found]:
+    """Searches for the worst flight.
+
+    Args:
+        model: The compiled model.
+        elastic: Its structure.
+        found: Its bounds.
+        axis: x, y or z.
+        evaluations: How many flights.
+        rng: Source of all that is random.
+        switchings: Of each channel.
+        disturbance: Largest constant torque about each axis over M0.
+        spin: Largest rate about each axis at t = 0, rad/s.
+
+    Returns:
+        The worst schedule, and what was measured over M_e.
+
+    Raises:
+        ValueError: If M_e is zero, or evaluations or switchings are not positive.
+    """
+    scale = float(found.bound[AXES.index(axis)])
+    if not (scale > 0 and switchings > 0):
+        raise ValueError(
+            f"M_e = {scale} N m about {axis} and switchings = {switchings} must be > 0: there is "
+            "nothing to search for"
+        )
+    plan = Plan(
+        torque=found.torque,
+        dwell=found.dwell,
+        wait=2 * np.pi / float(np.min(np.abs(found.eigenvalues))),
+        switchings=switchings,
+        disturbance=disturbance,
+        spin=spin,
+    )
+    step = _COARSE * longest_step(elastic)
+
+    def share(x: Array) -> float:
+        flight = plan.schedule(x).fly(model, step)
+        return float(np.abs(flight[f"moment_{axis}"]).max()) / scale
+
+    box = [(-1.0, 1.0)] * plan.variables
+    best = falsify(share, box, evaluations=evaluations, rng=rng)
+    return plan.schedule(best.x), best

@@ -1,0 +1,62 @@
+"""The picture of a certificate: bounds, exact worst case and measured peaks over the dwell."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from spacecraft_sim.certificate import AxisCertificate
+from spacecraft_sim.certificate_curves import Curves
+from spacecraft_sim.plots import BAD, DPI, GOOD, INK, SOFT, panel
+
+PRINTED, ANY, EXACT = GOOD, "#c98a00", "#1f6fd6"
+
+
+def write(
+    path: Path, title: str, certificates: Sequence[AxisCertificate], measured: Sequence[Curves]
+) -> None:
+    """Draws a panel an axis, moments over dwells, both logarithmic.
+
+    Args:
+        path: The PNG file.
+        title: One line over the page.
+        certificates: What is guaranteed about each axis.
+        measured: The curves of each axis.
+    """
+    figure = Figure(figsize=(18.0, 6.6), dpi=DPI)
+    FigureCanvasAgg(figure)
+    figure.text(0.012, 0.955, title, size=15, weight="bold", color=INK, va="center")
+    grid = figure.add_gridspec(1, 3, left=0.05, right=0.985, top=0.86, bottom=0.1, wspace=0.2)
+    for k, (certificate, curve) in enumerate(zip(certificates, measured, strict=True)):
+        axes = figure.add_subplot(grid[0, k])
+        if len(curve.worst):
+            _axis(axes, certificate, curve)
+        else:
+            axes.set(xticks=[], yticks=[])
+        words = f"{certificate.axis}: e = {certificate.disturbance:.4g}"
+        words += "" if len(curve.worst) else ", no elastic part is felt"
+        panel(axes, words, "least time between switchings, s", "moment of elastic parts, N m")
+    figure.savefig(path, pil_kwargs={"compress_level": 3})
+
+
+def _axis(axes: Axes, certificate: AxisCertificate, curve: Curves) -> None:
+    dwell = curve.bound[:, 0]
+    finite = np.isfinite(curve.bound[:, 1])
+    axes.loglog(*curve.bound[finite].T, color=PRINTED, linewidth=2.2, label="printed bound")
+    axes.plot(dwell, np.full(len(dwell), curve.l1), color=ANY, linewidth=1.8, linestyle="--",
+              label="bound for any switching (L1)")  # fmt: skip
+    axes.plot(*curve.worst.T, color=EXACT, linewidth=1.4, label="exact worst case")
+    for small, fill, words in ((True, BAD, ""), (False, "white", ", beyond small, slow motion")):
+        flown = [(x, y) for x, y, kept in curve.measured.tolist() if bool(kept) == small]
+        if flown:
+            axes.plot(*zip(*flown, strict=True), "o", color=BAD, markerfacecolor=fill,
+                      markersize=6, label=f"measured in MuJoCo{words}")  # fmt: skip
+    room = certificate.torque * (1 - abs(certificate.bias))
+    low, high = axes.get_ylim()
+    axes.axhspan(room, max(high, 2 * room), color=BAD, alpha=0.06, linewidth=0,
+                 label="says nothing of the attitude: M_e >= M0 - |M1|")  # fmt: skip
+    axes.axvline(curve.dwell, color=SOFT, linewidth=0.9, linestyle=":")
+    axes.set(xscale="log", yscale="log", ylim=(low, max(high, 2 * room)))

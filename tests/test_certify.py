@@ -1,0 +1,251 @@
+"""The command `certify`: tables, files, exit codes, time, what it says to bad input."""
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from spacecraft_sim import certificate_input, cli
+from spacecraft_sim.spacecraft import load
+
+slow = pytest.mark.slow
+
+
+def certify(out, name, *words):
+    return cli.main(["certify", str(name), "--out", str(out), *words])
+
+
+@pytest.fixture(scope="module")
+def light(tmp_path_factory):
+    """(exit code, folder, what was printed) of a machine that is certified."""
+    out = tmp_path_factory.mktemp("certificates") / "light"
+    program = [sys.executable, "-m", "spacecraft_sim.cli", "certify", "two_boom_light"]
+    done = subprocess.run(
+        [*program, "--out", str(out), "--timestep", "0.01"], capture_output=True, text=True
+    )
+    assert done.stderr == ""
+    return done.returncode, out, done.stdout
+
+
+def test_a_machine_that_is_certified_ends_with_0(light):
+    code, out, shown = light
+    assert code == 0
+    assert (out / "certificate.png").read_bytes().startswith(b"\x89PNG")
+    lines = {line.strip().split("  ")[0]: line for line in shown.splitlines()}
+    assert "0.1 N m" in lines["torque M0"]
+    assert "0.03876604 N m" in lines["M_e, printed bound"]
+    assert lines["eps0 = M_e/M0"].split()[-3:] == ["0.256585", "0", "0.269969"]
+    assert "(left_x)" in lines["A_m of the worst joint"]
+    assert '0.0004356 rad = 89.85"' in lines["two-level relay on the attitude: p0 u0 dwell^2"]
+    assert "vacuous" in lines["thrust against M1 alone, Ivanova & Sokolov"]
+    assert shown.count("|theta| at most") == 2
+    assert "small motion: deflection of" in shown
+    assert "slow rotation: rate over the slowest decay: 0.01" in shown
+    assert "x: e = 0.2566 < 1 - |F| = 1; by one mode: 2 mu/(1 - mu) = 0.0375 <" in shown
+    assert "y: nothing elastic is felt" in shown
+
+
+def test_the_json_says_all_of_it(light):
+    found = json.loads((light[1] / "certificate.json").read_text(encoding="utf-8"))
+    assert found["spacecraft"] == "two_boom_light"
+    assert found["holds"] is True
+    assert [axis["axis"] for axis in found["axes"]] == ["x", "y", "z"]
+    x, y, _ = found["axes"]
+    parts = ("contour", "sampling", "coupling", "lean")
+    assert x["attitude"]["total"] == pytest.approx(sum(x["attitude"][p] for p in parts), rel=1e-15)
+    assert x["quasi_rigid"]["lean"] > 0 == x["attitude"]["lean"]
+    assert x["others"] == {"thrust against M1 alone, Ivanova & Sokolov": None}  # infinite
+    assert x["remedy"] is None
+    assert all(a["holds"] and a["value"] < a["limit"] for a in x["assumptions"])
+    assert y["curves"]["worst_case"] == []
+    for axis in (x, found["axes"][2]):
+        curves = {name: np.array(axis["curves"][name]) for name in ("bound", "worst_case")}
+        measured = {dwell: peak for dwell, peak, small in axis["curves"]["measured"] if small}
+        worst = dict(curves["worst_case"].tolist())
+        assert len(measured) >= 2
+        assert max(dwell for dwell, *_ in axis["curves"]["measured"]) not in measured  # it spins up
+        for dwell, peak in measured.items():
+            # Small motion here: to 5 mrad, and steps of a quarter of a radian.
+            assert peak == pytest.approx(worst[dwell], rel=3e-3)
+        assert worst[2.0] == axis["exact_worst_case"]
+        bound = np.interp(list(worst), *curves["bound"].T)
+        # Between 81 points of a convex curve the chord is above it.
+        assert np.all(np.array(list(worst.values())) <= bound)
+        assert max(worst.values()) <= axis["moment_l1"]
+
+
+@slow
+def test_a_machine_that_is_not_ends_with_1_and_says_what_would_help(tmp_path, capsys):
+    assert certify(tmp_path / "out", "two_boom_3d") == 1
+    shown = capsys.readouterr().out
+    assert "x: vacuous on the attitude; e = 20.74 >= 1 - |F| = 1" in shown
+    assert "a dwell above 100.8 s, or 44.7 times the damping, or elastic masses of 0.18" in shown
+    assert "sampling period and delay within the dwell: 0.12 <= 2.66 s" in shown
+    found = json.loads((tmp_path / "out" / "certificate.json").read_text(encoding="utf-8"))
+    assert found["holds"] is False
+    assert found["axes"][0]["attitude"]["total"] is None
+    assert found["axes"][0]["quasi_rigid"]["total"] == pytest.approx(8.76e-4, abs=5e-7)
+    # The reference, at 2.66 s.
+    assert found["axes"][0]["moment"] == pytest.approx(0.4176906346, rel=1e-9)
+
+
+@slow
+def test_any_file_will_do_with_torque_and_dwell(tmp_path, capsys):
+    path = load("two_boom_light").xml.with_name("two_boom_light.xml")
+    words = ("--torque", "0.1", "--dwell", "2", "2", "2", "--disturbance", "0.01", "0", "-0.01")
+    assert certify(tmp_path / "out", path, *words) == 0
+    shown = capsys.readouterr().out
+    assert "MJCF file two_boom_light.xml" in shown
+    lines = {line.strip().split("  ")[0]: line.split() for line in shown.splitlines()}
+    assert lines["constant disturbance F = M1/M0"][-3:] == ["0.1", "0", "-0.1"]
+
+
+TIMED = """
+import time, mujoco
+from spacecraft_sim import certificate_curves, certificate_input
+from spacecraft_sim.certificate import certify
+from spacecraft_sim.elastic_mjcf import elastic_model, with_elastic_masses
+
+craft = certificate_input.read("four_boom")
+start = time.process_time()
+elastic = elastic_model(craft.model)
+found = certify(
+    elastic, torque=craft.torque, dwell=craft.dwell,
+    lighter=lambda factor: elastic_model(with_elastic_masses(craft.model, factor)),
+)
+assert len(elastic.D) == 12 and all(axis.remedy for axis in found)
+print(time.process_time() - start)
+curves = certificate_curves.curves(
+    craft.model, elastic, torque=craft.torque, dwell=craft.dwell, flown=()
+)
+assert all(len(curve.worst) > 15 for curve in curves)
+print(time.process_time() - start)
+"""
+
+
+def test_four_booms_are_certified_in_a_second_and_searched_in_ten():
+    environment = {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": ":".join(p for p in sys.path if p)}
+    done = subprocess.run(
+        [sys.executable, "-c", TIMED], capture_output=True, text=True, env=environment
+    )
+    assert done.stderr == ""
+    certified, searched = map(float, done.stdout.split())
+    assert certified < 1.0  # some 0.5 s of its own, scipy's import included
+    assert searched < 10.0  # some 2 s
+
+
+# -- bad input -------------------------------------------------------------------------------------
+
+CRAFT = """<mujoco><option gravity="0 0 {g}">{contacts}</option><worldbody>
+<body name="bus">{free}<inertial pos="0 0 0" mass="10" diaginertia="{inertia} 30 30"/>
+<geom size="1" mass="0"/>
+<body name="panel"><joint name="hinge" axis="1 0 0" {joint}/>
+<inertial pos="0 1 0" mass="1" diaginertia="1e-13 1e-13 1e-13"/>
+<body><inertial pos="0 -1 0" mass="1" diaginertia="1e-13 1e-13 1e-13"/>
+<geom size="1" mass="0"/></body></body>
+</body></worldbody></mujoco>"""
+GOOD = {
+    "g": 0, "contacts": '<flag contact="disable"/>', "free": "<freejoint/>", "inertia": 20,
+    "joint": 'stiffness="3" damping="1"',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"free": ""}, r"it needs one free joint, on the bus; it has 0 \(none\)"),
+        ({"joint": 'damping="1"'}, r"joint hinge has stiffness 0\.0, needs > 0"),
+        ({"joint": 'stiffness="-3" damping="1"'}, r"joint hinge has stiffness -3\.0, needs > 0"),
+        ({"joint": 'stiffness="3 1" damping="1"'}, "polynomial stiffness or damping"),
+        ({"joint": 'stiffness="3" damping="1" springref="0.1"'}, "set springref = ref"),
+        ({"joint": 'stiffness="3"'}, "a guaranteed bound needs damping in every motion"),
+        ({"inertia": "1e-10"}, r"D is not positive definite.*\(a collinear rod\)"),
+        ({"g": -9.81}, "gravity is on"),
+        ({"contacts": ""}, "contacts are on"),
+    ],
+)
+def test_what_is_no_free_elastic_structure_ends_with_2(changes, message, tmp_path, capsys):
+    path = tmp_path / "craft.xml"
+    path.write_text(CRAFT.format(**{**GOOD, **changes}), encoding="utf-8")
+    assert certify(tmp_path / "out", path, "--torque", "1", "--dwell", "1") == 2
+    error = capsys.readouterr().err
+    assert re.search(message, error), error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "message"),
+    [
+        ("two_boom_3d", ("--dwell", "0"), "--dwell must be finite and > 0, got 0.0"),
+        ("two_boom_3d", ("--dwell", "1", "-1", "1"), "--dwell must be finite and > 0"),
+        ("two_boom_3d", ("--torque", "0"), "--torque must be finite and > 0, got 0.0"),
+        ("two_boom_3d", ("--torque", "1", "2"), "--torque takes one number or three"),
+        ("two_boom_3d", ("--delay", "-1"), "--delay must be finite and >= 0, got -1.0"),
+        ("two_boom_3d", ("--disturbance", "1", "2"), "--disturbance takes one number or three"),
+        ("two_boom_3d", ("--disturbance", "0.02"), "about x, 0.02 N m, must be below the torque"),
+        ("two_boom_3d", ("--timestep", "-1"), "timestep = -1.0"),
+        ("two_bom_3d", (), "did you mean 'two_boom_3d'?"),
+        ("two_bom_3d", (), "or give the path of an MJCF file, ending in .xml"),
+        ("missing.xml", ("--torque", "1", "--dwell", "1"), "missing.xml: no such file"),
+        ("two_boom_free", (), "does not say what --torque and --dwell of its channels are"),
+        ("rigid_bus", ("--torque", "1", "--dwell", "1"), "nothing in it is elastic"),
+        ("two_boom", ("--torque", "1", "--dwell", "1"), "it needs one free joint"),
+    ],
+)
+def test_bad_numbers_and_names_end_with_2(name, words, message, tmp_path, capsys):
+    assert certify(tmp_path / "out", name, *words) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_needs_torque_and_dwell(tmp_path, capsys):
+    path = tmp_path / "craft.xml"
+    path.write_text(CRAFT.format(**GOOD), encoding="utf-8")
+    assert certify(tmp_path / "out", path, "--torque", "1") == 2
+    assert "craft does not say what --dwell of its channels are" in capsys.readouterr().err
+    path.write_text("<mujoco><nothing/></mujoco>", encoding="utf-8")
+    assert certify(tmp_path / "out", path, "--torque", "1", "--dwell", "1") == 2
+    assert "craft.xml: XML Error" in capsys.readouterr().err
+    (tmp_path / "out").mkdir()
+    assert certify(tmp_path / "out", "two_boom_light") == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+# -- what is read of a machine ---------------------------------------------------------------------
+
+
+def test_torques_are_levels_times_arms():
+    found = certificate_input.read("two_boom_3d")
+    assert found.torque == pytest.approx([0.02] * 3, rel=1e-14)  # 0.01 N, two arms of 1 m
+    assert found.dwell.tolist() == [2.66, 2.0, 2.04]
+    assert found.delay.tolist() == [0.12, 0.1, 0.08]
+    other = certificate_input.read("two_boom_3d", torque=[1.0, 2.0, 3.0], delay=[0.0])
+    assert other.torque.tolist() == [1.0, 2.0, 3.0]
+    assert other.dwell.tolist() == [2.66, 2.0, 2.04]
+    assert other.delay.tolist() == [0.0] * 3
+    free = certificate_input.read("two_boom_free", torque=[50.0], dwell=[0.05])
+    assert free.torque.tolist() == [50.0] * 3
+    assert free.delay.tolist() == [0.0] * 3
+
+
+@pytest.mark.parametrize(
+    ("motors", "message"),
+    [
+        ('["thruster_x_top"]', r"thruster_x at unit level is a force .* needs pure torques"),
+        ('["thruster_y_top", "thruster_y_bottom"]', "thruster_x and thruster_y both turn y"),
+    ],
+)
+def test_thrusters_that_are_no_pure_torques_are_refused(motors, message, tmp_path):
+    machine = load("two_boom_light")
+    text = machine.xml.with_name("two_boom_light.toml").read_text(encoding="utf-8")
+    text = text.replace('["thruster_x_top", "thruster_x_bottom"]', motors)
+    text = text.replace('"scene.xml"', f'"{machine.xml}"')
+    path = tmp_path / "odd.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=message):
+        certificate_input.read(str(path))
+    # Numbers of one's own do not need them.
+    assert certificate_input.read(str(path), torque=[1.0], dwell=[1.0]).name == "odd"
