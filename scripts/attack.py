@@ -31,7 +31,7 @@ def main(argv: list[str] | None = None) -> int:
         attacks.worst_phase(arguments.longest),
         attacks.at_random(arguments.longest),
         attacks.spinning(arguments.longest),
-        attacks.searched(arguments.evaluations),
+        attacks.searched(arguments.evaluations, arguments.longest),
     ):
         share = f"{row.measured / row.bound:7.4f}" if row.bound else "      -"
         attained = f"{row.measured / row.worst:8.4f}" if row.worst == row.worst else "       -"

@@ -21,11 +21,15 @@ _COARSE = 3.0  # steps of the search over exact ones
 class Plan:
     """Schedules as points of the box -1 <= x <= 1: signs, waits beyond the dwell, torque and spin.
 
+    The waits of a channel are given at its first and last switching and at knots between, and in
+    proportion elsewhere: few numbers for trains as long as it takes to ring a mode up.
+
     Attributes:
         torque: M0 of each channel, shape (3,), N m.
         dwell: Least time between switchings of each, shape (3,), s.
         wait: Longest time beyond the dwell, s.
-        switchings: Of each channel.
+        knots: Waits of each channel that are chosen.
+        duration: Length of the flight, s.
         disturbance: Largest constant torque about each axis over M0.
         spin: Largest rate about each axis at t = 0, rad/s.
     """
@@ -33,14 +37,15 @@ class Plan:
     torque: Array
     dwell: Array
     wait: float
-    switchings: int
+    knots: int
+    duration: float
     disturbance: float
     spin: float
 
     @property
     def variables(self) -> int:
         """How many numbers make a schedule."""
-        return 3 * (1 + self.switchings) + 6
+        return 3 * (1 + self.knots) + 6
 
     def schedule(self, x: Array) -> Schedule:
         """Returns the schedule of a point.
@@ -51,13 +56,16 @@ class Plan:
         channels, extra = x[:-6].reshape(3, -1), x[-6:]
         times, levels = [], []
         for M0, held, (sign, *waits) in zip(self.torque, self.dwell, channels, strict=True):
-            times.append(np.cumsum(held + self.wait * (1 + np.array(waits)) / 2))
-            alternating = (-1.0) ** np.arange(self.switchings + 1)
+            most = int(self.duration / held)
+            share = np.interp(np.linspace(0, 1, most), np.linspace(0, 1, self.knots), waits)
+            at = np.cumsum(held + self.wait * (1 + share) / 2)
+            times.append(at[at < self.duration])
+            alternating = (-1.0) ** np.arange(len(times[-1]) + 1)
             levels.append((M0 if sign >= 0 else -M0) * alternating)
         return Schedule(
             switch_times=tuple(times),
             levels=tuple(levels),
-            duration=float(max(at[-1] for at in times)) + self.wait,
+            duration=self.duration,
             disturbance=tuple((self.disturbance * self.torque * extra[:3]).tolist()),
             spin=tuple((self.spin * extra[3:]).tolist()),
         )
@@ -71,7 +79,8 @@ def search(
     axis: str,
     evaluations: int,
     rng: np.random.Generator,
-    switchings: int = 12,
+    duration: float,
+    knots: int = 3,
     disturbance: float = 0.0,
     spin: float = 0.0,
 ) -> tuple[Schedule, Found]:
@@ -84,7 +93,8 @@ def search(
         axis: x, y or z.
         evaluations: How many flights.
         rng: Source of all that is random.
-        switchings: Of each channel.
+        duration: Length of each flight, s.
+        knots: Waits of each channel that are chosen.
         disturbance: Largest constant torque about each axis over M0.
         spin: Largest rate about each axis at t = 0, rad/s.
 
@@ -92,19 +102,23 @@ def search(
         The worst schedule, and what was measured over M_e.
 
     Raises:
-        ValueError: If M_e is zero, or evaluations or switchings are not positive.
+        ValueError: If M_e is zero, evaluations are not positive, there are fewer than two knots, or
+            the flight is no longer than the longest dwell.
     """
     scale = float(found.bound[AXES.index(axis)])
-    if not (scale > 0 and switchings > 0):
+    if not scale > 0:
+        raise ValueError(f"M_e = {scale} N m about {axis}: there is nothing to search for")
+    if knots < 2 or not duration > max(found.dwell):
         raise ValueError(
-            f"M_e = {scale} N m about {axis} and switchings = {switchings} must be > 0: there is "
-            "nothing to search for"
+            f"knots = {knots} must be >= 2, and duration = {duration} s above the longest dwell, "
+            f"{max(found.dwell):.6g} s"
         )
     plan = Plan(
         torque=found.torque,
         dwell=found.dwell,
         wait=2 * np.pi / float(np.min(np.abs(found.eigenvalues))),
-        switchings=switchings,
+        knots=knots,
+        duration=duration,
         disturbance=disturbance,
         spin=spin,
     )

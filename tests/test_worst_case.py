@@ -297,27 +297,6 @@ def test_the_worst_schedule_flown(case):
         assert angle == pytest.approx(joint, rel=0.01, abs=5e-5)  # one or two digits given
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "dwell", "duration", "torque", "over_bound", "near"),
-    [
-        ("two_boom_3d", 2.66, 400.0, 1.0, 1.003, 0.01),
-        ("four_boom", 2.0, 300.0, 5.0, 1.044, 0.04),
-    ],
-)
-def test_the_bound_ends_where_motion_is_not_small(name, dwell, duration, torque, over_bound, near):
-    elastic = structure(name)
-    schedule = worst_case(
-        elastic, torque=torque, dwell=dwell, axis="x", step=STEP, horizon=duration
-    )
-    peak, _ = flown(name, schedule, 0)
-    bound = influence(elastic, torque=torque, dwell=dwell).moment[0]
-    assert peak > bound
-    # Of the channels that small motion does not feel, the reference tells no schedule; by how much
-    # the bound is exceeded depends on theirs.
-    assert peak / bound == pytest.approx(over_bound, abs=near)
-
-
 # -- what is refused -------------------------------------------------------------------------------
 
 

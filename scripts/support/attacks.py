@@ -147,11 +147,12 @@ def spinning(longest: float) -> Iterator[Row]:
         yield craft.row(f"worst two_boom_3d x, {spin:g} rad/s about y", tumbling, "x", worst)
 
 
-def searched(evaluations: int) -> Iterator[Row]:
+def searched(evaluations: int, longest: float) -> Iterator[Row]:
     """Lets the search look for the worst, within small motion and beyond it.
 
     Args:
         evaluations: Flights of each search.
+        longest: Flights are cut to this length, s.
     """
     for torque, push, spin in (
         (0.02, 0.0, 0.0),
@@ -163,6 +164,7 @@ def searched(evaluations: int) -> Iterator[Row]:
         schedule, _ = search(
             craft.model, craft.elastic, craft.bounds, axis="x", evaluations=evaluations,
             rng=np.random.default_rng(0), disturbance=push, spin=spin,
+            duration=min(400.0, longest),
         )  # fmt: skip
         yield craft.row(f"search two_boom_3d x, M1 to {push:g} M0, spin to {spin:g}", schedule, "x")
 
