@@ -14,7 +14,9 @@ p0(F, e) u0 dwell^2 and what late switching and the other axes add, each stated 
 
 With feedback of the quasi-rigid angle theta + H q/J and its rate, M. S. Efremov, A. E. Polyakov,
 V. V. Strygin (2006), (1.6), the elastic moment falls out and e is what is left, nothing as a rule;
-the attitude is off by H q/J on top.  That is never vacuous, however heavy the elastic parts.
+the attitude is off by H q/J on top.  That is never vacuous, however heavy the elastic parts.  Where
+nothing measures q, an observer of the machine estimates it from the attitude; what it corrects is
+slip and disturbance to the relay, and its error is added to the attitude's.
 """
 
 import math
@@ -22,10 +24,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from controllers.axis import Axis, Channel, channel, torque_gain
 from controllers.channels import Channels
 from controllers.dwell_relay_charts import charts
 from controllers.dwell_relay_claims import Claims
+from controllers.observer import ESTIMATED, ObservedLaw, Observer, Unknown, design_observer
 from spacecraft_sim.chart import Charts
 from spacecraft_sim.checks import positive
 from spacecraft_sim.dwell_axes import Band, RelayAxis, coupled
@@ -35,7 +40,7 @@ from spacecraft_sim.thrusters import Thrusters
 
 _CLOCK = 1e-9  # share of the dwell by which a sample may come early
 
-Feedback = Literal["attitude", "quasi_rigid"]
+Feedback = Literal["attitude", "quasi_rigid", "estimated"]
 
 
 class Memory(NamedTuple):
@@ -117,6 +122,24 @@ class DwellRelay:
         return self.half_width - sign * (x + v * abs(v) / (2 * room))
 
 
+class Numbers(NamedTuple):
+    """What is given of an axis: F and e, N m, and bounds of lean, rad, and sway, rad/s."""
+
+    bias: float
+    disturbance: float
+    lean: float
+    sway: float
+
+
+class Error(NamedTuple):
+    """Bounds of an observer about an axis: errors, rad and rad/s; corrections in time."""
+
+    angle: float
+    rate: float
+    slip: float
+    push: float
+
+
 def design(
     model: ReducedModel | None = None,
     thrusters: Thrusters | None = None,
@@ -127,9 +150,10 @@ def design(
     feedback: Feedback = "attitude",
     lean: tuple[float, ...] = (),
     sway: tuple[float, ...] = (),
+    noise: float = 1e-8,
     period: float | None = None,
     dwell: float | None = None,
-) -> tuple[Channels, tuple[Guarantee, ...]]:
+) -> tuple[Channels | ObservedLaw, tuple[Guarantee, ...]]:
     """Designs two-level relays about several axes, with what is guaranteed of each.
 
     Args:
@@ -138,13 +162,15 @@ def design(
             1 s if left out.
         axes: The axes under control; about others the bus must not turn.
         bias: F of each axis, the steady torque, N m; none if left out.
-        disturbance: e of each axis, the certified moment M_e of the elastic parts, N m; none if
-            left out.
-        feedback: What is fed back: the attitude of the bus and its rate, or the quasi-rigid angle
-            of bus and booms and its rate.
+        disturbance: e of each axis, N m: the certified moment M_e of the elastic parts if the
+            attitude is fed back; if the quasi-rigid angle is, what else there is; if that is
+            estimated, what the observer is not told of.  None if left out.
+        feedback: What is fed back: the attitude of the bus and its rate, the quasi-rigid angle of
+            bus and booms and its rate, or an estimate of these from the attitude alone.
         lean: Certified bound of |H q|/J of each axis, how far the attitude may be from the
             quasi-rigid angle, rad; with feedback of the attitude left out.
         sway: Certified bound of |H q'|/J of each axis, rad/s; likewise.
+        noise: Bound of the error with which an observer reads an attitude, rad.
         period: Sampling period, s; in continuous time if left out.
         dwell: Least time between switchings, s; that of each thruster if left out.
 
@@ -153,38 +179,51 @@ def design(
 
     Raises:
         ValueError: If |F| + e >= u0 about an axis, a dwell is zero, the numbers are not one an
-            axis, or the axes turn each other too fast.
+            axis, the axes turn each other too fast, or an observer lacks a period or a disturbance.
     """
     model = model or double_integrator()
     if period is not None:
         positive(period=period)
     given = {"bias": bias, "disturbance": disturbance, "lean": lean, "sway": sway}
     numbers = _by_axis(axes, given, feedback)
+    fed = "attitude" if feedback == "attitude" else "quasi_rigid"
     found: dict[Axis, Channel] = {
-        axis: channel(model, thrusters, axis=axis, feedback=feedback) for axis in axes
+        axis: channel(model, thrusters, axis=axis, feedback=fed) for axis in axes
     }
-    relays = {axis: _relay(axis, model, found, period, dwell, **numbers[axis]) for axis in axes}
+    observer, errors = None, None
+    if feedback == "estimated":
+        observer, errors = _observer(model, thrusters, found, numbers, noise, period)
+    relays = {
+        axis: _relay(axis, model, found, period, dwell, numbers[axis], errors) for axis in axes
+    }
     bands = coupled(relays)
+    prefix = ESTIMATED if observer else ""
     laws, claims = [], []
     for axis in axes:
-        law = _law(found[axis], bands[axis], period)
+        signals = (prefix + found[axis].sensors[0], prefix + found[axis].sensors[1])
+        law = _law(found[axis], bands[axis], period, signals)
         laws.append(law)
+        assumed = _assumptions(found[axis], relays[axis], period)
+        if observer:
+            assumed += (_untold(axis, bands[axis], numbers[axis].disturbance),)
         claims += Claims(
             axis=axis,
             band=bands[axis],
             level=law.level,
             torque_gain=torque_gain(model, axis),
-            sensors=(law.sensors[0], law.sensors[1]),
+            sensors=signals,
             channel=law.thrusters[0],
             decay=model.slowest_decay,
-            assumptions=_assumptions(found[axis], relays[axis], period),
+            period=period,
+            assumptions=assumed,
         ).all()
-    return Channels(laws=tuple(laws)), tuple(claims)
+    law = Channels(laws=tuple(laws))
+    return ObservedLaw(law=law, observer=observer) if observer else law, tuple(claims)
 
 
 def _by_axis(
     axes: tuple[Axis, ...], given: dict[str, tuple[float, ...]], feedback: Feedback
-) -> dict[Axis, dict[str, float]]:
+) -> dict[Axis, Numbers]:
     """The numbers of each axis; what is left out is zero."""
     if not axes or len(set(axes)) < len(axes):
         raise ValueError(f"axes = {list(axes)} must name one axis at least, and each once")
@@ -200,9 +239,41 @@ def _by_axis(
             "lean and sway are what feedback of the quasi-rigid angle leaves over; with "
             'controller.feedback = "attitude" leave them out'
         )
-    return {
-        axis: {name: values[k] if values else 0.0 for name, values in given.items()}
-        for k, axis in enumerate(axes)
+    rows = zip(*(given[name] or (0.0,) * len(axes) for name in Numbers._fields), strict=True)
+    return {axis: Numbers(*row) for axis, row in zip(axes, rows, strict=True)}
+
+
+def _observer(
+    model: ReducedModel,
+    thrusters: Thrusters | None,
+    found: dict[Axis, Channel],
+    numbers: dict[Axis, Numbers],
+    noise: float,
+    period: float | None,
+) -> tuple[Observer, dict[Axis, Error]]:
+    """An observer of the quasi-rigid angles that reads the attitude alone."""
+    if period is None:
+        raise ValueError(
+            'controller.feedback = "estimated" needs controller.period: an observer is sampled'
+        )
+    told = {a: torque_gain(model, a) / own.unit for a, own in found.items()}  # thrust per N m
+    for axis, own in numbers.items():
+        positive(**{f"disturbance of {axis}": own.disturbance})
+    observer, errors = design_observer(
+        model, thrusters, channels=tuple(own.thruster for own in found.values()),
+        sensors=tuple(f"attitude_{axis}" for axis in found),
+        fed=tuple(name for own in found.values() for name in own.sensors),
+        period=period,
+        unknown=Unknown(
+            thrust=tuple(abs(told[axis]) * own.disturbance for axis, own in numbers.items()),
+            impulse=(0.0,) * len(found),
+            noise=(noise,) * len(found),
+            steady=tuple(told[axis] * own.bias for axis, own in numbers.items()),
+        ),
+    )  # fmt: skip
+    pairs = np.stack([errors.error, errors.jumps]).reshape(2, -1, 2).tolist()
+    return observer, {
+        axis: Error(*error, *jumps) for axis, error, jumps in zip(found, *pairs, strict=True)
     }
 
 
@@ -212,11 +283,8 @@ def _relay(
     found: dict[Axis, Channel],
     period: float | None,
     dwell: float | None,
-    *,
-    bias: float,
-    disturbance: float,
-    lean: float,
-    sway: float,
+    numbers: Numbers,
+    errors: dict[Axis, Error] | None,
 ) -> RelayAxis:
     """One axis in the terms of `dwell_axes`."""
     own = found[axis]
@@ -233,13 +301,16 @@ def _relay(
         for name, other in found.items()
         if name != axis
     )
-    F, e = bias * gain / u0, (disturbance * gain + others) / u0
+    # An observer's corrections are what disturbs its estimates, and nothing else does.
+    error = errors[axis] if errors else Error(0.0, 0.0, 0.0, numbers.disturbance * gain)
+    F, e = numbers.bias * gain / u0, (error.push + others) / u0
     if not abs(F) + e < 1:
         raise ValueError(
             f"axis {axis}: the bias and the disturbance together, {abs(F) + e:.4g} of the thrust, "
             'must be below it: the guarantee is vacuous; take feedback = "quasi_rigid", for '
             "which the elastic parts are no disturbance"
         )
+    sampled = period if errors and period else 0.0  # between samples errors go on growing
     return RelayAxis(
         acceleration=u0,
         inertia=1 / gain,
@@ -247,8 +318,9 @@ def _relay(
         bias=F,
         disturbance=e,
         late=(period or 0.0) + (own.spec.delay.longest if own.spec else 0.0),
-        lean=lean,
-        sway=sway,
+        slip=error.slip,
+        lean=numbers.lean + error.angle + sampled * (error.rate + error.slip),
+        sway=numbers.sway + error.rate + sampled * error.push,
     )
 
 
@@ -256,7 +328,7 @@ def _thrust(found: Channel) -> float:
     return found.spec.levels[-1] if found.spec else 1.0
 
 
-def _law(found: Channel, band: Band, period: float | None) -> DwellRelay:
+def _law(found: Channel, band: Band, period: float | None, signals: tuple[str, str]) -> DwellRelay:
     axis, half = band.axis, band.contour.half_width * band.axis.length
     return DwellRelay(
         half_width=half,
@@ -267,8 +339,15 @@ def _law(found: Channel, band: Band, period: float | None) -> DwellRelay:
         sensors=found.sensors,
         thrusters=(found.thruster,),
         period=period,
-        charts=charts(band, name=found.axis, signals=found.sensors, channel=found.thruster),
+        charts=charts(band, name=found.axis, signals=signals, channel=found.thruster),
     )
+
+
+def _untold(axis: Axis, band: Band, disturbance: float) -> Assumption:
+    return Assumption(
+        text=f"{axis}: gyroscopic torque within what the observer is not told of",
+        value=band.gyroscopic * band.axis.inertia, limit=disturbance, relation="<=", unit="N m",
+    )  # fmt: skip
 
 
 def _assumptions(found: Channel, axis: RelayAxis, period: float | None) -> tuple[Assumption, ...]:

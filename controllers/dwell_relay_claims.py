@@ -33,6 +33,7 @@ class Claims:
         torque_gain: Acceleration at 1 N m, rad/s^2.
         sensors: Names of angle and rate that are fed back.
         channel: Name of the thruster.
+        period: Sampling period, s; None in continuous time.
         decay: Of the slowest elastic motion, 1/s; inf if there is none.
         assumptions: Hypotheses that the design decides.
     """
@@ -44,6 +45,7 @@ class Claims:
     sensors: tuple[str, str]
     channel: str
     decay: float
+    period: float | None
     assumptions: tuple[Assumption, ...]
 
     def all(self) -> tuple[Guarantee, ...]:
@@ -154,8 +156,8 @@ class Claims:
         time, rate = track.time[row:], track[self.sensors[1]][row:]
         thrust = track[f"{self.channel}_impulse"][row:] * (axis.acceleration / self.level)
         rows, last = [0], float(time[0])
-        for i, t in enumerate(time.tolist()):
-            if t - last >= _STEP * axis.dwell:  # over less, rounding of the rate counts
+        for i in self._samples(time).tolist():
+            if (t := float(time[i])) - last >= _STEP * axis.dwell:  # over less, rounding counts
                 rows.append(i)
                 last = t
         span = np.diff(time[rows])
@@ -163,6 +165,14 @@ class Claims:
             return 0.0
         mean = (np.diff(rate[rows]) - np.diff(thrust[rows])) / span
         return float(np.max(np.abs(mean - axis.bias * axis.acceleration)))
+
+    def _samples(self, time: Array) -> Array:
+        """Rows between which a mean may be taken: between samples an estimate does not follow."""
+        if self.period is None:
+            return np.arange(len(time))
+        phase = time / self.period
+        last = np.diff(time, append=math.inf) > 1e-9 * self.period
+        return np.flatnonzero(last & (np.abs(phase - np.round(phase)) < 1e-6))
 
     def _slip(self, track: Trajectory, row: int) -> float:
         """Largest |(phi x omega)/2| about the axis, the kinematics of three axes."""

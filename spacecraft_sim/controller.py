@@ -53,3 +53,14 @@ class Controller(Protocol):
             memory: What the last step returned.
         """
         ...
+
+
+def estimates_of(law: Any) -> dict[str, str]:
+    """Returns names of what a law estimates, with units; nothing if it has no `estimates`.
+
+    A law that has them has a method `estimated` too, which reads their values from its memory.
+
+    Args:
+        law: A controller.
+    """
+    return dict(getattr(law, "estimates", {}))

@@ -9,7 +9,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from spacecraft_sim import crossing
-from spacecraft_sim.controller import Controller
+from spacecraft_sim.controller import Controller, estimates_of
 from spacecraft_sim.disturbance import Disturbance
 from spacecraft_sim.plant import Plant
 from spacecraft_sim.scenario import Initial
@@ -52,6 +52,7 @@ class ControlTask(control.Task):
         self._controller, self._thrusters = controller, thrusters
         self._initial, self._disturbance = initial, disturbance
         self._accuracy = accuracy
+        self._estimates = bool(estimates_of(controller))
         self._random = np.random.default_rng(seed)
         self._channels = [thrusters.names.index(name) for name in controller.thrusters]
         # Whether instants at which something switches are to be found inside a step.
@@ -260,7 +261,8 @@ class ControlTask(control.Task):
         """Returns the signals of a row of the recorder, with their units.
 
         `<thruster>` is the thrust, `<thruster>_command` the law's command, `<input>_impulse` the
-        time integral of an input and `<thruster>_spent` that of its magnitude.
+        time integral of an input and `<thruster>_spent` that of its magnitude.  What a law
+        estimates stands under the names that it gives.
 
         Args:
             physics: The plant.
@@ -272,6 +274,7 @@ class ControlTask(control.Task):
             **{f"{name}_command": "N or N m" for name in channels},
             **{f"{name}_impulse": "N s or N m s" for name in inputs},
             **{f"{name}_spent": "N s or N m s" for name in channels},
+            **estimates_of(self._controller),
             **physics.coordinate_units(),
         }
 
@@ -279,10 +282,12 @@ class ControlTask(control.Task):
         if self.recorder is None:
             return
         t = physics.time()
+        estimated = self._controller.estimated(self._memory) if self._estimates else ()
         self.recorder.add(
             [
                 *(t, *self._read(), *self._thrust, *self._torque(t)),
-                *(*self._command, *self._impulse, *self._spent, *physics.coordinates()),
+                *(*self._command, *self._impulse, *self._spent),
+                *(*estimated, *physics.coordinates()),
             ]
         )
 
