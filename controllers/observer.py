@@ -13,7 +13,7 @@ Stationary Kalman gain: B. D. O. Anderson, J. B. Moore, "Optimal filtering" (197
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,6 +64,11 @@ class Observer:
     fed: Array
     start: Array
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Observer) and all(
+            np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
+        )
+
     def predicted(self, x: Array, commands: Sequence[Sequence[float]]) -> Array:
         """Returns the state one period later.
 
@@ -98,11 +103,11 @@ class Memory(NamedTuple):
     """
 
     law: Any
-    state: Array | None
+    state: tuple[float, ...] | None
     commands: tuple[tuple[float, ...], ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ObservedLaw:
     """A sampled law that is fed estimates.
 
@@ -155,10 +160,11 @@ class ObservedLaw:
         if memory.state is None:
             x = observer.start @ np.asarray(y)
         else:
-            x = observer.corrected(observer.predicted(memory.state, memory.commands), y)
+            before = observer.predicted(np.array(memory.state), memory.commands)
+            x = observer.corrected(before, y)
         u, own = self.law.step(t, (observer.fed @ x).tolist(), memory.law)
         kept = max(observer.lags) + 2
-        return u, Memory(own, x, (tuple(u), *memory.commands)[:kept])
+        return u, Memory(own, tuple(x.tolist()), (tuple(u), *memory.commands)[:kept])
 
     def estimated(self, memory: Memory) -> list[float]:
         """Returns the estimates, in the order of their names.

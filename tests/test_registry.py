@@ -29,6 +29,7 @@ MACHINES = {
 MODES = {"rigid_bus": 0}  # elastic modes of the reduced plant, where not two
 CLOSE = {"max_delay": 0.21, "accuracy": 0.007, "c": 0.31}  # Efremov et al. (2006), section 5
 CONTROLLERS = {
+    "dwell_relay": {"axes": ("z",)},
     "efremov_local": CLOSE,
     "efremov_nonlocal": {**CLOSE, "radius": 0.1, "gain": 2.765},
     "efremov_observed": {
@@ -54,7 +55,8 @@ ACCELERATIONS = {
 }
 ACCELERATIONS["efremov_observed"] = ACCELERATIONS["efremov_nonlocal"]
 REGULATORS = (
-    "ivanova_sokolov", "ivanova_sokolov_axes", "phase_plane", "pwpf", "schmitt_trigger",
+    "dwell_relay", "ivanova_sokolov", "ivanova_sokolov_axes", "phase_plane", "pwpf",
+    "schmitt_trigger",
 )  # fmt: skip
 ACCELERATIONS |= {law: [1e-3] for law in (*REGULATORS, "manoeuvre")}
 # Thrusters of the laws that are made for a minimum on-time; the others act 0.2 s late.
@@ -117,7 +119,7 @@ def ready(law, machine):
     inertia, arm = MACHINES[machine]
     levels = [a * inertia / arm for a in ACCELERATIONS[law]]
     controller = CONTROLLERS[law]
-    if law.startswith("ivanova"):  # torques in terms of the thrust
+    if law == "dwell_relay" or law.startswith("ivanova"):  # torques in terms of the thrust
         M0 = ACCELERATIONS[law][0] * inertia
         steady, rest = 0.8 * M0, 0.08 * M0
         one = law == "ivanova_sokolov"

@@ -1,0 +1,203 @@
+"""Relays with a dwell about three axes: reference flights, what is fed back, what is refused."""
+
+import dataclasses
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from relatives import generator, relative
+
+from controllers.channels import Channels
+from controllers.dwell_relay import design
+from spacecraft_sim import mission
+from spacecraft_sim.dwell_accuracy import guaranteed_accuracy
+from spacecraft_sim.elastic_influence import influence
+from spacecraft_sim.scenario import Scenario
+
+slow = pytest.mark.slow
+
+# Machine, damping ratio, tip, dwell, M0, M1 about x and -z: measured over guaranteed, by axis.
+CLOSED_LOOP = {
+    ("two_boom_3d", 0.02, 0.03, 2, 1, 0): {"x": 0.833, "z": 0.860},
+    ("two_boom_3d", 0.05, 0.1, 2, 1, 0): {"x": 0.737, "z": 0.766},
+    ("two_boom_3d", 0.05, 0.1, 2, 10, 0): {"x": 0.740, "z": 0.769},
+    ("two_boom_3d", 0.05, 0.3, 5, 1, 0): {"x": 0.542, "z": 0.625},
+    ("two_boom_3d", 0.05, 0.3, 0.5, 1, 0): {"x": 0.364, "z": 0.352},
+    ("two_boom_3d", 0.2, 1, 20, 0.05, 0): {"x": 0.628, "z": 0.611},
+    ("two_boom_3d", 0.02, 0.1, 5, 1, 0.1): {"x": 0.703, "z": 0.776},
+    ("four_boom", 0.05, 0.05, 2, 1, 0): {"x": 0.877, "y": 0.902, "z": 0.794},
+}
+STARTS = (0.0, -0.2, -0.4, -0.6)  # angle on the switching arc over p
+
+
+def loop(row, start):
+    """(measured over guaranteed by axis, shortest time between switchings over the dwell)."""
+    name, ratio, tip, dwell, M0, M1 = row
+    _, elastic = relative(tip, ratio, name)
+    u0, F = M0 / np.diag(elastic.J), np.array([M1, 0, -M1]) / M0
+    e = influence(elastic, torque=M0, dwell=dwell).bound / M0
+    p0 = [guaranteed_accuracy(abs(a), b) for a, b in zip(F, e, strict=True)]
+    p = 1.001 * np.array(p0) * u0 * dwell**2  # the reference has a thousandth of room
+    brake, push = u0 * (1 - F - e), u0 * (1 + F - e)
+    with tempfile.TemporaryDirectory() as folder:
+        machine = generator().write(
+            Path(folder), name, tip=tip, ratio=ratio, torque=M0, dwell=float(dwell)
+        )
+        ready = mission.assemble(
+            Scenario.model_validate(
+                {
+                    "name": "loop",
+                    "title": "the relays of the reference, sampled as there",
+                    "spacecraft": str(machine),
+                    "duration": 100.0,
+                    "initial": {
+                        "attitude": tuple(start * p),
+                        "rate": tuple(np.sqrt(2 * brake * (1 - start) * p)),
+                    },
+                    "controller": {
+                        "law": "dwell_relay",
+                        "axes": ("x", "y", "z"),
+                        "disturbance": tuple((e * M0).tolist()),
+                        "bias": (M1, 0.0, -M1),
+                        "period": 0.01,
+                    },
+                    "disturbance": {
+                        a: {"waveform": "square", "amplitude": m, "frequency": 1e-6}
+                        for a, m in (("x", M1), ("z", -M1))
+                        if m
+                    },
+                    "simulation": {"timestep": 0.01, "substeps": 1},
+                    "reduced": {"source": "mjcf", "modes": 2},
+                }
+            )
+        )
+    # The bare contour of the reference, without what sampling and the other axes add.
+    bare = zip(ready.controller.laws, p, brake, push, strict=True)
+    laws = [dataclasses.replace(x, half_width=a, brake=b, push=c) for x, a, b, c in bare]
+    track = dataclasses.replace(ready, controller=Channels(laws=tuple(laws))).fly()
+    shares = {a: np.abs(track[f"attitude_{a}"]).max() / x for a, x in zip("xyz", p, strict=True)}
+    gaps = []
+    for axis in "xyz":
+        rows = np.flatnonzero(np.diff(np.sign(track[f"thruster_{axis}"]), prepend=0))
+        gaps.append(np.diff(track.time[rows]).min() / dwell)
+    return shares, min(gaps)
+
+
+@slow
+@pytest.mark.parametrize("row", CLOSED_LOOP, ids=str)
+def test_three_axes_in_closed_loop_as_in_the_reference(row):
+    # The reference starts on the switching arc, and does not say where; the first swings count.
+    flights = [loop(row, start) for start in STARTS]
+    for axis, reference in CLOSED_LOOP[row].items():
+        shares = [found[axis] for found, _ in flights]
+        assert 0.98 * min(shares) < reference < 1.02 * max(shares)
+        assert max(shares) < 1
+    # The clock of a sampled flight is exact to 1e-9 of a dwell.
+    assert min(gap for _, gap in flights) > 1 - 1e-9
+
+
+def test_sampling_costs_what_the_certificate_adds_for_it():
+    # About y nothing elastic disturbs; the bare contour is left by 8 h/dwell at most.
+    found, _ = loop(("two_boom_3d", 0.05, 0.1, 2, 1, 0), 0.0)
+    assert 1.02 < found["y"] < 1.001 * (1 + 8 * 0.01 / 2) * 1.01  # and 1 % from the other axes
+
+
+# -- what is fed back ------------------------------------------------------------------------------
+
+
+def assembled(name, *settings):
+    return mission.assemble(mission.load_scenario(name, settings))
+
+
+def attitude_claims(ready):
+    return {g.claim[10]: g for g in ready.guarantees if g.claim.startswith("|attitude")}
+
+
+@pytest.mark.parametrize("plant", ["mujoco", "reduced"])
+@pytest.mark.parametrize("name", ["sokolov-attitude", "sokolov-quasi-rigid", "sokolov-estimated"])
+def test_every_claim_holds_on_both_plants(name, plant):
+    ready = assembled(name, "duration=100.0")
+    track = ready.fly(plant)
+    for guarantee in ready.guarantees:
+        verdict = guarantee.check(track)
+        assert verdict.holds, (verdict.claim, [str(a) for a in verdict.failed])
+
+
+def test_what_is_measured_or_estimated_costs_lean_and_corrections():
+    measured = attitude_claims(assembled("sokolov-quasi-rigid", "controller.period=0.05"))
+    estimated = attitude_claims(assembled("sokolov-estimated"))
+    vacuous = 'controller.feedback="attitude"', "controller.lean=[]", "controller.sway=[]"
+    with pytest.raises(ValueError, match=r"0\.4148.*20\.7|the guarantee is vacuous"):
+        assembled("sokolov-quasi-rigid", *vacuous, "controller.disturbance=[0.4148, 0.0, 0.4336]")
+    for axis, guarantee in estimated.items():
+        assert measured[axis].bound < guarantee.bound < 1.2 * measured[axis].bound
+
+
+def test_the_estimate_follows_the_quasi_rigid_angle_from_the_attitude_alone():
+    ready = assembled("sokolov-estimated", "duration=150.0")
+    assert ready.controller.sensors == ("attitude_x", "attitude_y", "attitude_z")
+    track = ready.fly()
+    time = track.time
+    rows = np.abs(time / 0.05 - np.round(time / 0.05)) < 1e-6
+    rows &= (time > 100) & (np.diff(time, append=np.inf) > 1e-9)
+    for axis in "xyz":
+        true = track[f"quasi_rigid_angle_{axis}"][rows]
+        error = np.abs(track[f"estimated_quasi_rigid_angle_{axis}"][rows] - true).max()
+        # On top of the measured case the bound has the observer's error, and what sampling adds.
+        assert error < 5e-6 < 0.1 * attitude_claims(ready)[axis].bound
+        swing = np.abs(track[f"attitude_{axis}"][rows] - true).max()
+        assert axis == "y" or error < 0.1 * swing  # the attitude itself is no estimate
+
+
+def test_another_machine_than_the_observer_believes_is_told():
+    ready = assembled("sokolov-estimated", "duration=100.0", "actual.thrusters.all.delay=0.5")
+    verdict = attitude_claims(ready)["x"].check(ready.fly())
+    assert not verdict.holds
+    assert any("|eps| <= e in flight" in a.text for a in verdict.failed)
+
+
+def test_commands_between_samples_are_foretold():
+    # A delay that is no multiple of the period; the start is at rest: the estimate is exact.
+    late = "thrusters.all.delay=0.13", "duration=60.0"
+    track = assembled("sokolov-estimated", *late).fly("reduced")
+    time = track.time
+    rows = np.abs(time / 0.05 - np.round(time / 0.05)) < 1e-6
+    rows &= np.diff(time, append=np.inf) > 1e-9
+    for axis in "xyz":
+        true = track[f"quasi_rigid_angle_{axis}"][rows]
+        assert np.abs(true).max() > 1e-5
+        # Rounding alone: 1200 samples of 1e-4 rad.
+        assert np.abs(track[f"estimated_quasi_rigid_angle_{axis}"][rows] - true).max() < 1e-15
+
+
+# -- what is refused -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"axes": ()}, "must name one axis at least, and each once"),
+        ({"axes": ("z", "z")}, "must name one axis at least, and each once"),
+        ({"disturbance": (0.1, 0.2)}, r"axes = \['z'\] need one disturbance each"),
+        ({"disturbance": (-0.1,)}, "disturbance of z = -0.1"),
+        ({"bias": (0.6,), "disturbance": (0.5,)}, "1.1 of the thrust, must be below it"),
+        ({"lean": (0.1,)}, 'with controller.feedback = "attitude" leave them out'),
+        ({"dwell": 0.0}, "the least time between switchings is 0.0 s and must be > 0"),
+        ({"period": -1.0}, "period = -1.0"),
+        ({"feedback": "estimated"}, "an observer is sampled"),
+        (
+            {"feedback": "estimated", "period": 0.1},
+            "must be finite and > 0: disturbance of z = 0.0",
+        ),
+    ],
+)
+def test_bad_numbers_are_refused(changes, message):
+    with pytest.raises(ValueError, match=message.replace("(", r"\(")):
+        design(**{"axes": ("z",), **changes})
+
+
+def test_on_a_rigid_machine_the_law_is_the_undisturbed_one():
+    law, guarantees = design(axes=("z",), dwell=1.0)
+    assert law.laws[0].half_width == pytest.approx(0.125, rel=1e-12)
+    assert guarantees[0].bound == pytest.approx(0.125, rel=2e-6)  # rounding is allowed for
