@@ -196,7 +196,7 @@ def certify(
             inertia_fraction=float(elastic.inertia_fraction[k]),
             decay=_decay(elastic, found, k),
             remedy=helps.get(k),
-            assumptions=(*shared, *_lateness(axis)),
+            assumptions=(*shared, *_lateness(name, axis)),
         )
         for k, (name, axis) in enumerate(full.items())
     )
@@ -302,8 +302,8 @@ def _assumptions(
     return tuple(listed)
 
 
-def _lateness(axis: RelayAxis) -> tuple[Assumption, ...]:
+def _lateness(name: str, axis: RelayAxis) -> tuple[Assumption, ...]:
     if not axis.late:
         return ()
-    text = "sampling period and delay within the dwell"
+    text = f"{name}: sampling period and delay within the dwell"
     return (Assumption(text=text, value=axis.late, limit=axis.dwell, relation="<=", unit="s"),)

@@ -1,5 +1,6 @@
 """The picture of a certificate: bounds, exact worst case and measured peaks over the dwell."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -26,26 +27,43 @@ def write(
         certificates: What is guaranteed about each axis.
         measured: The curves of each axis.
     """
-    figure = Figure(figsize=(18.0, 6.6), dpi=DPI)
+    figure = Figure(figsize=(18.0, 7.0), dpi=DPI)
     FigureCanvasAgg(figure)
     figure.text(0.012, 0.955, title, size=15, weight="bold", color=INK, va="center")
-    grid = figure.add_gridspec(1, 3, left=0.05, right=0.985, top=0.86, bottom=0.1, wspace=0.2)
+    grid = figure.add_gridspec(1, 3, left=0.05, right=0.985, top=0.86, bottom=0.17, wspace=0.2)
+    key = {}
     for k, (certificate, curve) in enumerate(zip(certificates, measured, strict=True)):
         axes = figure.add_subplot(grid[0, k])
+        words = _promise(certificate)
+        panel(axes, words, "least time between switchings, s", "moment of elastic parts, N m")
         if len(curve.worst):
             _axis(axes, certificate, curve)
+            handles, labels = axes.get_legend_handles_labels()
+            key |= dict(zip(labels, handles, strict=True))
         else:
             axes.set(xticks=[], yticks=[])
-        words = f"{certificate.axis}: e = {certificate.disturbance:.4g}"
-        words += "" if len(curve.worst) else ", no elastic part is felt"
-        panel(axes, words, "least time between switchings, s", "moment of elastic parts, N m")
+            axes.text(0.5, 0.5, "no elastic part is felt in small motion", color=SOFT, ha="center")
+    figure.legend(
+        key.values(), key.keys(), loc="lower center", ncols=len(key), fontsize=9.5, frameon=False
+    )
     figure.savefig(path, pil_kwargs={"compress_level": 3})
+
+
+def _promise(certificate: AxisCertificate) -> str:
+    """What is guaranteed about an axis, for the head of its panel."""
+    head = f"{certificate.axis}: e = {certificate.disturbance:.3g}"
+    bounds = {"attitude": certificate.attitude, "quasi-rigid angle": certificate.quasi_rigid}
+    for fed, accuracy in bounds.items():
+        if math.isfinite(accuracy.total):
+            arcsec = math.degrees(accuracy.total) * 3600
+            return f'{head}, |theta| <= {arcsec:.3g}" by the {fed}'
+    return f"{head}, nothing is guaranteed"
 
 
 def _axis(axes: Axes, certificate: AxisCertificate, curve: Curves) -> None:
     dwell = curve.bound[:, 0]
     finite = np.isfinite(curve.bound[:, 1])
-    axes.loglog(*curve.bound[finite].T, color=PRINTED, linewidth=2.2, label="printed bound")
+    axes.loglog(*curve.bound[finite].T, color=PRINTED, linewidth=2.2, label="printed bound (27)")
     axes.plot(dwell, np.full(len(dwell), curve.l1), color=ANY, linewidth=1.8, linestyle="--",
               label="bound for any switching (L1)")  # fmt: skip
     axes.plot(*curve.worst.T, color=EXACT, linewidth=1.4, label="exact worst case")
@@ -53,10 +71,11 @@ def _axis(axes: Axes, certificate: AxisCertificate, curve: Curves) -> None:
         flown = [(x, y) for x, y, kept in curve.measured.tolist() if bool(kept) == small]
         if flown:
             axes.plot(*zip(*flown, strict=True), "o", color=BAD, markerfacecolor=fill,
-                      markersize=6, label=f"measured in MuJoCo{words}")  # fmt: skip
+                      markersize=6.5, label=f"worst case flown in MuJoCo{words}")  # fmt: skip
     room = certificate.torque * (1 - abs(certificate.bias))
     low, high = axes.get_ylim()
-    axes.axhspan(room, max(high, 2 * room), color=BAD, alpha=0.06, linewidth=0,
-                 label="says nothing of the attitude: M_e >= M0 - |M1|")  # fmt: skip
-    axes.axvline(curve.dwell, color=SOFT, linewidth=0.9, linestyle=":")
-    axes.set(xscale="log", yscale="log", ylim=(low, max(high, 2 * room)))
+    top = max(high, 2.5 * room)
+    axes.axhspan(room, top, color=BAD, alpha=0.06, linewidth=0,
+                 label="says nothing of the attitude: above M0 - |M1|")  # fmt: skip
+    axes.axvline(curve.dwell, color=SOFT, linewidth=1.2, linestyle=":", label="dwell")
+    axes.set(ylim=(min(low, room / 2), top))

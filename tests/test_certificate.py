@@ -95,7 +95,10 @@ def test_late_switching_is_sampling_and_delay():
     for a, b in zip(both, one, strict=True):
         assert a.attitude == b.attitude
         assert a.attitude.sampling > 0.03 * 2.0 * 0.1 / a.inertia  # u0 dwell h, and more for e > 0
-        assert str(a.assumptions[-1]) == "sampling period and delay within the dwell: 0.03 <= 2 s"
+        assert (
+            str(a.assumptions[-1])
+            == f"{a.axis}: sampling period and delay within the dwell: 0.03 <= 2 s"
+        )
 
 
 def test_other_regulators_are_asked():

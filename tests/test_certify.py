@@ -83,7 +83,7 @@ def test_a_machine_that_is_not_ends_with_1_and_says_what_would_help(tmp_path, ca
     shown = capsys.readouterr().out
     assert "x: vacuous on the attitude; e = 20.74 >= 1 - |F| = 1" in shown
     assert "a dwell above 100.8 s, or 44.7 times the damping, or elastic masses of 0.18" in shown
-    assert "sampling period and delay within the dwell: 0.12 <= 2.66 s" in shown
+    assert "x: sampling period and delay within the dwell: 0.12 <= 2.66 s" in shown
     found = json.loads((tmp_path / "out" / "certificate.json").read_text(encoding="utf-8"))
     assert found["holds"] is False
     assert found["axes"][0]["attitude"]["total"] is None
