@@ -6,7 +6,7 @@ Times of one machine say little; the ratios carry over.
 import argparse
 import sys
 
-from support import flight_cost, plan_cost, recording_cost, relay_cost
+from support import certificate_cost, flight_cost, plan_cost, recording_cost, relay_cost
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -24,6 +24,8 @@ def main(argv: list[str] | None = None) -> int:
     flight_cost.controlled_step(span=arguments.span, rounds=arguments.rounds)
     flight_cost.whole_run(duration=arguments.duration, rounds=min(arguments.rounds, 3))
     plan_cost.beside_cvxpy(rounds=min(arguments.rounds, 3))
+    certificate_cost.four_booms(rounds=min(arguments.rounds, 3))
+    certificate_cost.growth(rounds=min(arguments.rounds, 3))
     recording_cost.recording(duration=arguments.duration, rounds=min(arguments.rounds, 5))
     relay_cost.beside_rivals(rounds=min(arguments.rounds, 3))
     relay_cost.growth(longest=arguments.longest)

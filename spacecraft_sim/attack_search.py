@@ -5,16 +5,20 @@ from typing import Any
 
 import numpy as np
 
-from spacecraft_sim.attack import Schedule
+from spacecraft_sim.attack import Schedule, claim
 from spacecraft_sim.elastic_flight import longest_step
 from spacecraft_sim.elastic_influence import Influence
 from spacecraft_sim.elastic_modes import ElasticModel
 from spacecraft_sim.falsify import Found, falsify
+from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.relay_channels import AXES
 
 Array = np.ndarray
 
 _COARSE = 3.0  # steps of the search over exact ones
+_RUNG_UP = 3.0  # time constants of the slowest motion in a flight: 95 % of all there is
+_LONGEST = 400.0  # s
+_SILENT = 1e-9  # share of the largest bound below which an axis is not disturbed at all
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,3 +135,31 @@ def search(
     box = [(-1.0, 1.0)] * plan.variables
     best = falsify(share, box, evaluations=evaluations, rng=rng)
     return plan.schedule(best.x), best
+
+
+def attack(
+    model: Any, elastic: ElasticModel, found: Influence, *, evaluations: int, seed: int = 0
+) -> dict[str, Verdict]:
+    """Searches about each axis that is disturbed, and holds the worst flight to the bound.
+
+    Args:
+        model: The compiled model.
+        elastic: Its structure.
+        found: Its bounds.
+        evaluations: How many flights about each axis.
+        seed: Of all that is random.
+
+    Returns:
+        The verdict on the worst flight about each axis.
+    """
+    duration = min(_RUNG_UP / found.modes.slowest_decay, _LONGEST)
+    duration = max(duration, 3 * float(max(found.dwell)))
+    verdicts = {}
+    for axis, bound in zip(AXES, found.bound, strict=True):
+        if bound > _SILENT * found.bound.max():
+            schedule, _ = search(
+                model, elastic, found, axis=axis, evaluations=evaluations, duration=duration,
+                rng=np.random.default_rng(seed),
+            )  # fmt: skip
+            verdicts[axis] = claim(elastic, found, axis).check(schedule.fly(model))
+    return verdicts

@@ -2,15 +2,17 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from spacecraft_sim.attack import word
 from spacecraft_sim.certificate import AxisCertificate
 from spacecraft_sim.certificate_curves import Curves
 from spacecraft_sim.certificate_input import Craft
 from spacecraft_sim.dwell_axes import Accuracy
+from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.versions import versions
 
 ARCSEC = math.degrees(1) * 3600  # of a radian
@@ -37,6 +39,7 @@ def rows(
     row("M_e, printed bound", lambda c: _number(c.moment, "N m", 7, "refused"))
     row("M_e, any switching (L1)", lambda c: f"{c.moment_l1:.7g} N m")
     table.append(("worst case that exists", *(_number(x.here, "N m", 6) for x in measured)))
+    table.append(("  flown in MuJoCo", *(_flown(x) for x in measured)))
     row("eps0 = M_e/M0", lambda c: f"{c.disturbance:.6g}")
     row("A_m of the worst joint", lambda c: f"{c.deflection:.4g} ({c.joint})")
     row("two-level relay on the attitude: p0 u0 dwell^2", lambda c: _angle(c.attitude.contour))
@@ -58,6 +61,31 @@ _TERMS: dict[str, Callable[[Accuracy], float]] = {
     "late switching: sampling, delay": lambda a: a.sampling,
     "axes turning each other": lambda a: a.coupling,
 }
+
+
+def _flown(curve: Curves) -> str:
+    """The largest moment in the flight of the worst schedule at the certified dwell."""
+    if not curve.here:
+        return ""
+    here = [row for row in curve.measured.tolist() if row[0] == curve.dwell]
+    if not here:
+        return "not flown"
+    _, peak, small = here[0]
+    return f"{peak:.6g} N m" + ("" if small else ", beyond small motion")
+
+
+def attacked(attacks: Mapping[str, Verdict], flights: int) -> list[str]:
+    """Returns a line on each axis that was attacked.
+
+    Args:
+        attacks: The verdict on the worst flight about each axis.
+        flights: How many were flown about each.
+    """
+    return [
+        f"{axis}: the worst of {flights} flights reaches {v.measured:.6g} N m, "
+        f"{v.measured / v.bound:.1%} of M_e and what small motion leaves out: {word(v)}"
+        for axis, v in attacks.items()
+    ]
 
 
 def explanations(certificates: Sequence[AxisCertificate]) -> list[str]:
@@ -96,7 +124,11 @@ def assumptions(certificates: Sequence[AxisCertificate]) -> list[str]:
 
 
 def write(
-    folder: Path, craft: Craft, certificates: Sequence[AxisCertificate], measured: Sequence[Curves]
+    folder: Path,
+    craft: Craft,
+    certificates: Sequence[AxisCertificate],
+    measured: Sequence[Curves],
+    attacks: Mapping[str, Verdict],
 ) -> None:
     """Writes `certificate.json` and `certificate.png`.
 
@@ -105,6 +137,7 @@ def write(
         craft: What was certified.
         certificates: What is guaranteed about each axis.
         measured: The curves of each axis.
+        attacks: The verdict on the worst flight about each axis that was attacked.
     """
     from spacecraft_sim import plots_certificate
 
@@ -129,6 +162,7 @@ def write(
             }
             for c, curve in zip(certificates, measured, strict=True)
         ],
+        "attacks": {axis: {"word": word(v), **asdict(v)} for axis, v in attacks.items()},
         "versions": versions(),
     }
     text = json.dumps(_plain(table), indent=2, allow_nan=False, ensure_ascii=False)

@@ -113,6 +113,8 @@ def _parser() -> argparse.ArgumentParser:
         certify.add_argument(f"--{key}", type=float, nargs="+", metavar=unit, help=words)
     words = "sampling period of the regulator, s; continuous time if left out"
     certify.add_argument("--timestep", type=float, default=0.0, metavar="s", help=words)
+    words = "search for the worst switchings in so many flights on MuJoCo about each axis"
+    certify.add_argument("--attack", type=int, default=0, metavar="FLIGHTS", help=words)
     certify.add_argument("--out", type=Path, help="folder to write; default runs/NAME, numbered")
     return parser
 

@@ -162,7 +162,14 @@ def certify(arguments: argparse.Namespace) -> int:
     )
     folder = run_folder.create(arguments.out, f"certificate-{craft.name}")
     curves = certificate_curves.curves(craft.model, elastic, torque=craft.torque, dwell=craft.dwell)
-    certificate_report.write(folder, craft, certificates, curves)
+    attacks = {}
+    if arguments.attack:
+        from spacecraft_sim.attack_search import attack
+        from spacecraft_sim.elastic_influence import influence
+
+        found = influence(elastic, torque=craft.torque, dwell=craft.dwell)
+        attacks = attack(craft.model, elastic, found, evaluations=arguments.attack)
+    certificate_report.write(folder, craft, certificates, curves, attacks)
     console = terminal.console()
     table = Table("", "x", "y", "z", title=f"{craft.name}: {craft.title}", box=None)
     terminal.fill(table, certificate_report.rows(certificates, curves))
@@ -172,8 +179,13 @@ def certify(arguments: argparse.Namespace) -> int:
     console.print("[bold]assumptions[/]")
     for line in certificate_report.assumptions(certificates):
         console.print(f"  {line}", highlight=False)
+    if attacks:
+        console.print("[bold]attacked[/]")
+    for line in certificate_report.attacked(attacks, arguments.attack):
+        console.print(f"  {line}", highlight=False)
     console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
-    return HOLDS if all(c.holds for c in certificates) else FAILS
+    broken = any(not v.holds and not v.failed for v in attacks.values())
+    return HOLDS if all(c.holds for c in certificates) and not broken else FAILS
 
 
 # -- export ----------------------------------------------------------------------------------------
