@@ -258,7 +258,7 @@ def _observer(
         )
     told = {a: torque_gain(model, a) / own.unit for a, own in found.items()}  # thrust per N m
     for axis, own in numbers.items():
-        positive(**{f"disturbance of {axis}": own.disturbance})
+        positive(zero=False, **{f"disturbance of {axis}": own.disturbance})
     observer, errors = design_observer(
         model, thrusters, channels=tuple(own.thruster for own in found.values()),
         sensors=tuple(f"attitude_{axis}" for axis in found),

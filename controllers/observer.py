@@ -247,7 +247,7 @@ def design_observer(
     import scipy.linalg  # slow to import, and seldom needed
 
     noise = {f"noise of {name}": x for name, x in zip(sensors, unknown.noise, strict=True)}
-    positive(period=period, **noise)
+    positive(zero=False, period=period, **noise)
     C, E = _rows(model, sensors), _rows(model, fed)
     kept = _kept(model, C)
     A, C, E = _state_matrix(model)[np.ix_(kept, kept)], C[:, kept], E[:, kept]

@@ -1,5 +1,7 @@
 """Laws of mechanics as guarantees: they hold for every controller and judge the simulation."""
 
+import math
+
 import numpy as np
 
 from spacecraft_sim.guarantee import Guarantee, Measurement
@@ -52,10 +54,10 @@ def _tilted(model: ReducedModel, trajectory: Trajectory, axis: str) -> float:
     others = [a for a in "xyz" if a != axis and f"angular_momentum_{a}" in model.outputs]
     if len(others) < 2:
         return 0.0  # it turns about this axis alone
-    tilt = float(np.hypot(*(trajectory[f"attitude_{a}"] for a in others)).max())
+    tilt = float(np.linalg.norm([trajectory[f"attitude_{a}"] for a in others], axis=0).max())
     total = 0.0
     for channel in model.inputs:
         spent = float(np.abs(np.diff(trajectory[f"{channel}_impulse"])).sum())
         own, *across = (model.gain(channel, f"angular_momentum_{a}") for a in (axis, *others))
-        total += spent * float(np.hypot(*across) + tilt * abs(own))
+        total += spent * (math.hypot(*across) + tilt * abs(own))
     return tilt * total

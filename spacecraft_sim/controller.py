@@ -64,3 +64,13 @@ def estimates_of(law: Any) -> dict[str, str]:
         law: A controller.
     """
     return dict(getattr(law, "estimates", {}))
+
+
+def estimated_by(law: Any, memory: Any) -> Sequence[float]:
+    """Returns what a law estimates, in the order of `estimates_of`.
+
+    Args:
+        law: A controller.
+        memory: What its last step returned.
+    """
+    return law.estimated(memory) if estimates_of(law) else ()

@@ -9,7 +9,7 @@ from dm_control.rl import control
 from dm_env import specs
 
 from spacecraft_sim import crossing
-from spacecraft_sim.controller import Controller, estimates_of
+from spacecraft_sim.controller import Controller, estimated_by, estimates_of
 from spacecraft_sim.disturbance import Disturbance
 from spacecraft_sim.plant import Plant
 from spacecraft_sim.scenario import Initial
@@ -52,7 +52,6 @@ class ControlTask(control.Task):
         self._controller, self._thrusters = controller, thrusters
         self._initial, self._disturbance = initial, disturbance
         self._accuracy = accuracy
-        self._estimates = bool(estimates_of(controller))
         self._random = np.random.default_rng(seed)
         self._channels = [thrusters.names.index(name) for name in controller.thrusters]
         # Whether instants at which something switches are to be found inside a step.
@@ -282,7 +281,7 @@ class ControlTask(control.Task):
         if self.recorder is None:
             return
         t = physics.time()
-        estimated = self._controller.estimated(self._memory) if self._estimates else ()
+        estimated = estimated_by(self._controller, self._memory)
         self.recorder.add(
             [
                 *(t, *self._read(), *self._thrust, *self._torque(t)),
