@@ -7,20 +7,16 @@ rows of `body_axes`; om = (p, q, r) = `rate_x`, `rate_y`, `rate_z`; and the torq
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from controllers.burkov_charts import body_charts, spin_charts
 from controllers.burkov_claims import PAPER, Start, Theorem, settling_time
+from controllers.burkov_energy import Body, body_terms, spin_terms
 from controllers.burkov_laws import BodyVectors, BodyVectorsAndRates, Spin
-from controllers.burkov_lyapunov import (
-    Body,
-    Vector,
-    basin,
-    body_energy,
-    spin_condition,
-    spin_energy,
-)
+from controllers.burkov_lyapunov import Vector, basin, spin_condition, spin_energy
 from controllers.gains import orthogonal_axes, positive_entries
 from controllers.velocity_filter import Hold, SampledLaw, sampled
 from spacecraft_sim.checks import positive
@@ -133,8 +129,11 @@ def body_vectors(
     state = np.concatenate([np.zeros(3), goal])
     plant = linear_plant(body, state=state, torques=np.zeros(3), basis=body.tangent(state))
 
+    terms = partial(body_terms, formula, model)
+    law = replace(law, charts=body_charts(law, formula, terms, RATES))
+
     def energy(y: Vector, w: Vector, om: Vector) -> float:
-        return body_energy(formula, model, y[:6], om, w)
+        return sum(terms(y, w, om).values())
 
     def entry(start: Start) -> tuple[Assumption, ...]:
         text = "V(0) < 2 min(k2, k3): no other equilibrium within reach"
@@ -194,7 +193,7 @@ def permanent_rotation(
     positive(alpha=alpha, beta=beta, gamma=gamma, k=k, accuracy=accuracy)
     formula = Spin(alpha=alpha, beta=beta, gamma=gamma, k=k, spin=_finite(spin=spin))
     condition = _required(formula, model, spin, "Theorem 5.3, (5.19)")
-    law = _spinning(formula, period, thrusters)
+    law = _spinning(formula, model, period, thrusters)
 
     def energy(y: Vector, w: Vector, z: Vector) -> float:
         return spin_energy(formula, model, z[:3], z[3:], spin)
@@ -248,7 +247,7 @@ def two_torques(
     positive(beta=beta, gamma=gamma, k=k, accuracy=accuracy)
     formula = Spin(alpha=None, beta=beta, gamma=gamma, k=k, spin=_finite(spin=spin))
     condition = _required(formula, model, spin, "Theorem 5.4 as corrected")
-    law = _spinning(formula, period, thrusters)
+    law = _spinning(formula, model, period, thrusters)
     settling = max(settling_time(_loop(law, model, c)) for c in (0.0, spin))
 
     def member(start: Start) -> float:  # V about the spin that the flight starts with
@@ -306,9 +305,9 @@ def _required(formula: Spin, body: Body, c: float, theorem: str) -> Assumption:
     return condition
 
 
-def _spinning(formula: Spin, period: float, thrusters: Thrusters | None) -> SampledLaw:
+def _spinning(formula: Spin, model: Body, period: float, thrusters: Thrusters | None) -> SampledLaw:
     whole = formula.alpha is not None
-    return sampled(
+    law = sampled(
         formula,
         cutoffs=(),
         hold="first-order hold",
@@ -317,6 +316,9 @@ def _spinning(formula: Spin, period: float, thrusters: Thrusters | None) -> Samp
         channels=TORQUES if whole else TORQUES[1:],
         thrusters=thrusters,
     )
+    c = formula.spin if whole else 0.0  # 0: the printed V
+    terms = partial(spin_terms, formula, model, c)
+    return replace(law, charts=spin_charts(law, terms, _S1, RATES))
 
 
 def _spin_theorem(

@@ -53,9 +53,7 @@ def samples(law: SampledLaw, trajectory: Trajectory, moving: Sequence[str]) -> S
     Raises:
         ValueError: If the flight has no row at some sample.
     """
-    count = trajectory.time / law.period
-    at = np.flatnonzero(np.abs(count - np.round(count)) < 1e-6)
-    numbers = np.round(count[at])
+    at, numbers = sample_rows(trajectory.time, law.period)
     if len(at) == 0 or np.any(np.diff(numbers) != 1):
         raise ValueError(
             f"the flight has no row at every sample of its law, {law.period:.6g} s apart: "
@@ -71,6 +69,18 @@ def samples(law: SampledLaw, trajectory: Trajectory, moving: Sequence[str]) -> S
         memory = law.filter.step(law.formula.filtered(t, y), memory)
         filtered.append(memory.w)
     return Samples(time, readings, np.array(filtered), columns(law.thrusters), columns(moving))
+
+
+def sample_rows(time: Array, period: float) -> tuple[Array, Array]:
+    """Returns the rows of a flight that are at samples, and the numbers of these samples.
+
+    Args:
+        time: Times of the rows, shape (n,), s.
+        period: Sampling period, s.
+    """
+    count = time / period
+    at = np.flatnonzero(np.abs(count - np.round(count)) < 1e-6)
+    return at, np.round(count[at]).astype(int)
 
 
 class Start(NamedTuple):

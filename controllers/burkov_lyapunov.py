@@ -7,10 +7,17 @@ little to V now and then.
 import itertools
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
+from controllers.burkov_energy import (
+    Body,
+    body_terms,
+    flexible_terms,
+    position_terms,
+    spin_terms,
+)
 from controllers.burkov_laws import BodyVectors, BodyVectorsAndRates, Position, Spin
 from spacecraft_sim.dynamics import jacobian
 from spacecraft_sim.guarantee import Assumption
@@ -18,45 +25,9 @@ from spacecraft_sim.mechanisms import FlexibleMechanism, Mechanism
 
 Array = np.ndarray
 Vector = Sequence[float] | Array
-_NODES = 24  # of the Gauss-Legendre rule along which gravity is summed to a potential
-
-
-class Body(Protocol):
-    """What conditions on a rigid body ask of it."""
-
-    @property
-    def inertia(self) -> tuple[float, float, float]:
-        """A, B, C, principal moments of inertia, kg m^2."""
-        ...
 
 
 # -- mechanisms --------------------------------------------------------------------------------
-
-
-def kinetic_energy(mechanism: Mechanism, q: Vector, v: Vector) -> float:
-    """Returns q' A(q) q'/2, J.
-
-    Args:
-        mechanism: The mechanism.
-        q: Joint angles, shape (n,), rad.
-        v: Their rates, shape (n,), rad/s.
-    """
-    momentum = mechanism.inverse_dynamics(q, np.zeros(len(v)), v) - mechanism.gravity(q)
-    return float(np.asarray(v) @ momentum) / 2
-
-
-def potential_energy(mechanism: Mechanism, q: Vector, start: Vector) -> float:
-    """Returns Pi(q) - Pi(start), the work against gravity along a straight line, J.
-
-    Args:
-        mechanism: The mechanism.
-        q: Joint angles, shape (n,), rad.
-        start: Those from which it is counted, shape (n,), rad.
-    """
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    way = np.asarray(q, dtype=float) - start
-    along = [mechanism.gravity(start + (1 + s) / 2 * way) @ way for s in nodes]
-    return float(weights @ along) / 2
 
 
 def position_energy(law: Position, mechanism: Mechanism, q: Vector, v: Vector, w: Vector) -> float:
@@ -69,11 +40,7 @@ def position_energy(law: Position, mechanism: Mechanism, q: Vector, v: Vector, w
         v: Their rates, shape (n,), rad/s.
         w: Filtered rates, shape (n,), rad.
     """
-    x, w = np.asarray(q) - law.target, np.asarray(w)
-    V = kinetic_energy(mechanism, q, v) + (x @ np.array(law.K1) @ x + law.K2 @ w**2) / 2
-    if law.mechanism is None:
-        V += potential_energy(mechanism, q, law.target) - law.bias @ x
-    return float(V)
+    return sum(position_terms(law, mechanism, q, w, v).values())
 
 
 def flexible_energy(
@@ -92,11 +59,7 @@ def flexible_energy(
         v: Their rates, rad/s.
         w: Filtered rates of the rotors, rad.
     """
-    q1, q2 = (np.asarray(z, dtype=float) for z in q)
-    x2, v2, w = q2 - law.target, np.asarray(v[1]), np.asarray(w)
-    springs = mechanism.stiffnesses @ (q1 - q2) ** 2 + x2 @ np.array(law.K1) @ x2
-    rotors = mechanism.rotors @ v2**2 + law.K2 @ w**2
-    return kinetic_energy(mechanism.links, q1, v[0]) + float(springs + rotors) / 2
+    return sum(flexible_terms(law, mechanism, q[1], w, np.concatenate([q[0], *v])).values())
 
 
 def position_loss(law: Position, cutoffs: Vector, w: Vector) -> float:
@@ -200,11 +163,7 @@ def body_energy(
         om: Rate in principal axes, shape (3,), rad/s.
         w: Filtered rates of s, shape (6,); none with a law that measures om.
     """
-    V = body.inertia @ np.asarray(om) ** 2
-    V += np.repeat(law.k, 3) @ (np.asarray(s) - np.ravel(law.r)) ** 2
-    if isinstance(law, BodyVectors):
-        V += np.ravel(law.G) @ np.asarray(w) ** 2
-    return float(V) / 2
+    return sum(body_terms(law, body, s, w, om).values())
 
 
 def body_loss(
@@ -277,9 +236,7 @@ def spin_energy(law: Spin, body: Body, s: Vector, om: Vector, c: float) -> float
         om: Rate in principal axes, shape (3,), rad/s.
         c: Spin of the member: p_p under (5.18); under (5.20) any, 0 for the printed V, rad/s.
     """
-    p, q, r = om
-    V = body.inertia @ np.array([p - c, q, r]) ** 2
-    return float(V + law.k * ((s[0] - 1) ** 2 + s[1] ** 2 + s[2] ** 2)) / 2
+    return sum(spin_terms(law, body, c, (), (), [*s, *om]).values())
 
 
 def spin_loss(law: Spin, body: Body, om: Vector, c: float) -> float:

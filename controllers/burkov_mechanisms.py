@@ -1,13 +1,17 @@
 """Designs of Burkov (1998) that hold a position: rigid mechanisms and flexible joints."""
 
 import math
+from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
+from controllers.burkov_charts import mechanism_charts
 from controllers.burkov_claims import PAPER, Start, Theorem, settling_time
+from controllers.burkov_energy import flexible_terms, position_terms
 from controllers.burkov_laws import Position
-from controllers.burkov_lyapunov import flexible_energy, gravity_condition, position_energy, rests
+from controllers.burkov_lyapunov import gravity_condition, rests
 from controllers.gains import Numbers, finite_entries, positive_definite, positive_entries
 from controllers.velocity_filter import Hold, SampledLaw, sampled
 from spacecraft_sim.checks import positive
@@ -95,8 +99,11 @@ def position(
 
     settling = settling_time(close(law, linear_mechanism(model, q=q_p)))
 
+    terms = partial(position_terms, formula, model)
+    law = replace(law, charts=mechanism_charts(law, terms, rates, rates))
+
     def energy(y: Vector, w: Vector, v: Vector) -> float:
-        return position_energy(formula, model, y, v, w)
+        return sum(terms(y, w, v).values())
 
     def entry(start: Start) -> tuple[Assumption, ...]:
         V0 = energy(*start)
@@ -182,15 +189,18 @@ def flexible_joint(
     )
     settling = settling_time(close(law, linear_flexible(model, q=q_p)))
 
+    terms = partial(flexible_terms, formula, model)
+    moving = (*links, *rates["link"], *rates["rotor"])
+    law = replace(law, charts=mechanism_charts(law, terms, moving, rates["rotor"]))
+
     def energy(y: Vector, w: Vector, moving: Vector) -> float:
-        rates = moving[n : 2 * n], moving[2 * n :]
-        return flexible_energy(formula, model, (moving[:n], y), rates, w)
+        return sum(terms(y, w, moving).values())
 
     theorem = Theorem(
         source=f"{PAPER}, Theorem 4.1",
         law=law,
         assumptions=(_weightless(model.links, q_p),),
-        moving=(*links, *rates["link"], *rates["rotor"]),
+        moving=moving,
         speeds=rates["rotor"],
         energy=energy,
         deviation=lambda y, z: math.hypot(math.dist(y, q_p), math.dist(z[:n], q_p)),

@@ -7,17 +7,19 @@ it is close to q_p', with which the filter starts.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from controllers.burkov_charts import path_charts
 from controllers.burkov_claims import PAPER, as_commanded
 from controllers.burkov_laws import Path
 from controllers.gains import Numbers, positive_entries
 from controllers.programmes import Harmonic, Return
 from controllers.velocity_filter import Hold, SampledLaw, VelocityFilter, sampled
 from controllers.velocity_filter import Memory as FilterMemory
+from spacecraft_sim.chart import Charts
 from spacecraft_sim.checks import positive
 from spacecraft_sim.guarantee import Assumption, Guarantee, Measurement
 from spacecraft_sim.loop_margins import Loop, close
@@ -48,6 +50,7 @@ class Replanning:
         thrusters: The motors.
         above: |q - q_p| at which the path is planned anew, rad.
         blend: How long the new path takes to reach the programme, s.
+        charts: What it would draw of a flight.
     """
 
     formula: Path
@@ -56,6 +59,7 @@ class Replanning:
     thrusters: tuple[str, ...]
     above: float
     blend: float
+    charts: Charts = field(default=(), compare=False)
 
     @property
     def period(self) -> float:
@@ -76,13 +80,24 @@ class Replanning:
             y: Joint angles, rad.
             memory: What the last step returned.
         """
+        memory = self.after(t, y, memory)
+        return memory.formula.command(t, y, memory.filter.w), memory
+
+    def after(self, t: float, y: Sequence[float], memory: Memory | None) -> Memory:
+        """Returns the new memory alone.
+
+        Args:
+            t: Time, s.
+            y: Joint angles, rad.
+            memory: What the last step returned.
+        """
         formula = memory.formula if memory else self.formula
         before = memory.filter if memory else None
         after = self.filter.step(formula.filtered(t, y), before)
         if math.dist(y, formula.programme(t).q) > self.above:
             formula = replace(formula, programme=self._way_back(t, y, formula, after.w))
             after = self.filter.step(formula.filtered(t, y), None)
-        return formula.command(t, y, after.w), Memory(formula, after)
+        return Memory(formula, after)
 
     def events(self, t: float, y: Sequence[float], memory: Memory | None) -> tuple[float, ...]:
         """Returns nothing: the law is sampled.
@@ -189,7 +204,9 @@ def path(
             above=replan_above,
             blend=blend,
         )
-    return law, claims
+    return replace(
+        law, charts=path_charts(law, formula, replanned=replan_above is not None)
+    ), claims
 
 
 def frozen_loops(law: SampledLaw, mechanism: Mechanism, times: Sequence[float]) -> list[Loop]:

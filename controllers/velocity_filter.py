@@ -16,10 +16,11 @@ fails from KT = 2 on.  The filter starts at the measured value, w = 0: no kick a
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 from controllers.gains import Numbers, positive_entries
+from spacecraft_sim.chart import Charts
 from spacecraft_sim.checks import choices, positive
 from spacecraft_sim.filtered_law import Formula
 from spacecraft_sim.thrusters import Thrusters
@@ -111,12 +112,14 @@ class SampledLaw:
         filter: Its filter; one without channels for a law that filters nothing.
         sensors: What it reads.
         thrusters: The channels that it commands.
+        charts: What it would draw of a flight.
     """
 
     formula: Formula
     filter: VelocityFilter
     sensors: tuple[str, ...]
     thrusters: tuple[str, ...]
+    charts: Charts = field(default=(), compare=False)
 
     @property
     def period(self) -> float:
@@ -137,8 +140,18 @@ class SampledLaw:
             y: Readings, in the order of `sensors`.
             memory: What the last step returned.
         """
-        memory = self.filter.step(self.formula.filtered(t, y), memory)
+        memory = self.after(t, y, memory)
         return self.formula.command(t, y, memory.w), memory
+
+    def after(self, t: float, y: Sequence[float], memory: Memory | None) -> Memory:
+        """Returns the new memory alone.
+
+        Args:
+            t: Time, s.
+            y: Readings, in the order of `sensors`.
+            memory: What the last step returned.
+        """
+        return self.filter.step(self.formula.filtered(t, y), memory)
 
     def events(self, t: float, y: Sequence[float], memory: Memory | None) -> tuple[float, ...]:
         """Returns nothing: the law is sampled.

@@ -1,12 +1,13 @@
 """What a law would draw beside its theorem, as plain data: the page and the recording show it.
 
-A law may have an attribute `charts`, a tuple of portraits and maps; those who draw know no law.
+A law may have an attribute `charts`, a tuple of portraits, maps, histories and spheres; those who
+draw know no law.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -90,7 +91,115 @@ class Map:
     regions: tuple[Region, ...] = ()
 
 
-Charts = tuple[Portrait | Map, ...]
+class Measured(NamedTuple):
+    """What a part of a flight adds to a history.
+
+    Attributes:
+        rows: Numbers of the rows that have values, ascending, shape (n,).
+        values: One column a curve, shape (n, k).
+        memory: What to hand over with the next part.
+    """
+
+    rows: Array
+    values: Array
+    memory: Any
+
+
+class Measure(Protocol):
+    """Computes the curves of a history from a flight, part after part, each row seen once."""
+
+    def __call__(self, part: Trajectory, wanted: Array, memory: Any) -> Measured:
+        """Returns values for those of the wanted rows that can have some.
+
+        Args:
+            part: The next rows of the flight.
+            wanted: Whether a row is wanted, shape (n,).
+            memory: What the part before left; None at the start of a flight.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """A curve of a history.
+
+    Attributes:
+        name: Its name in the key.
+        hue: Number of its colour, which it may share; None for what the history is about.
+        beneath: Whether it is drawn wide, for another of its colour to lie upon it.
+    """
+
+    name: str
+    hue: int | None = None
+    beneath: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class History:
+    """Quantities over time that a flight does not hold as signals.
+
+    Attributes:
+        name: One word, for files and paths.
+        title: What it shows.
+        unit: Its unit; empty for a pure number.
+        curves: Its curves.
+        signals: Names of the signals that it is computed from.
+        measure: Computes the curves.
+        decades: How many powers of ten below the first value a logarithmic axis reaches down to;
+            None where the axis is linear.
+    """
+
+    name: str
+    title: str
+    unit: str
+    curves: tuple[Curve, ...]
+    signals: tuple[str, ...]
+    measure: Measure
+    decades: int | None = None
+
+    @property
+    def heads(self) -> list[int]:
+        """Numbers of the curves that the history is about."""
+        return [k for k, curve in enumerate(self.curves) if curve.hue is None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrow:
+    """A unit vector that moves on a sphere.
+
+    Attributes:
+        name: Its name.
+        signals: Names of the signals of its components.
+        target: Where it is to point, a unit vector; opposite to it is a second equilibrium.
+        basin: Outline of where it stays if its flight is certified, shape (n, 3); None if that is
+            all of the sphere or nothing is certified.
+    """
+
+    name: str
+    signals: tuple[str, str, str]
+    target: tuple[float, float, float]
+    basin: Array | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sphere:
+    """Unit vectors on the unit sphere of the frame in which they are measured.
+
+    Attributes:
+        name: One word, for files and paths.
+        title: What it shows.
+        arrows: The vectors.
+        bound: What the outlines of the basins say, in words; empty if there are none.
+    """
+
+    name: str
+    title: str
+    arrows: tuple[Arrow, ...]
+    bound: str = ""
+
+
+Chart = Portrait | Map | History | Sphere
+Charts = tuple[Chart, ...]
 
 
 def charts_of(law: Any) -> Charts:
@@ -153,10 +262,70 @@ def locked(measured: Trajectory, portrait: Portrait) -> Array:
     return (sign != 0) & (age < portrait.min_on_time * (1 - 1e-9))
 
 
-def portraits(charts: Sequence[Portrait | Map]) -> list[Portrait]:
+def portraits(charts: Sequence[Chart]) -> list[Portrait]:
     """Returns the portraits among some charts.
 
     Args:
         charts: The charts.
     """
     return [chart for chart in charts if isinstance(chart, Portrait)]
+
+
+def histories(charts: Sequence[Chart], flight: Trajectory) -> list[History]:
+    """Returns the histories among some charts that can be computed from a flight.
+
+    Args:
+        charts: The charts.
+        flight: The flight.
+    """
+    found = [chart for chart in charts if isinstance(chart, History)]
+    return [chart for chart in found if all(name in flight.signals for name in chart.signals)]
+
+
+def spheres(charts: Sequence[Chart], flight: Trajectory) -> list[Sphere]:
+    """Returns the spheres among some charts whose vectors a flight has.
+
+    Args:
+        charts: The charts.
+        flight: The flight.
+    """
+    found = [chart for chart in charts if isinstance(chart, Sphere)]
+    return [c for c in found if all(n in flight.signals for a in c.arrows for n in a.signals)]
+
+
+def path_of(arrow: Arrow, flight: Trajectory) -> Array:
+    """Returns where the tip of an arrow is at each row of a flight, shape (n, 3).
+
+    Args:
+        arrow: The arrow.
+        flight: The flight.
+    """
+    return np.stack([flight[name] for name in arrow.signals], axis=1)
+
+
+def series(history: History, flight: Trajectory, most: int) -> tuple[Array, Array]:
+    """Returns times and values of a history over a whole flight.
+
+    Args:
+        history: The history.
+        flight: The flight.
+        most: How many rows at most, about; they lie evenly.
+
+    Returns:
+        Times, shape (n,), s, and values, shape (n, k).
+    """
+    wanted = np.zeros(len(flight.time), dtype=bool)
+    wanted[np.unique(np.linspace(0, len(wanted) - 1, most).astype(int))] = True
+    found = history.measure(flight, wanted, None)
+    return flight.time[found.rows], found.values
+
+
+def floor(history: History, first: Array) -> float:
+    """Returns the value below which a logarithmic axis shows nothing.
+
+    Args:
+        history: A history with a logarithmic axis.
+        first: Its first values, shape (k,).
+    """
+    largest = float(np.max(np.abs(first), initial=0.0)) or 1.0
+    return largest * 10.0 ** -(history.decades or 0)

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter, create_model
 
 import controllers
 from controllers import REGISTRY, Design
-from controllers.burkov_lyapunov import Body
+from controllers.burkov_energy import Body
 from spacecraft_sim import (
     beam,
     compiled_mechanism,

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from controllers import burkov
+from controllers.burkov_energy import potential_energy
 from controllers.burkov_lyapunov import (
     flexible_energy,
     gravity_condition,
     position_energy,
     position_loss,
-    potential_energy,
     rests,
 )
 from spacecraft_sim.dynamics import jacobian
