@@ -61,6 +61,7 @@ class Beneath:
         frames: Draws a part of it, given its rows, the frames and the rows of the other flight.
         factor: How many times too far all booms are bent.
         channels: Channels that get lanes of their own.
+        charts: What its law draws.
         notes: What is to be said of the recording.
     """
 
@@ -75,6 +76,7 @@ class Beneath:
     frames: Callable[[Trajectory, Frames, Trajectory], Frames]
     factor: float
     channels: Sequence[Channel] = ()
+    charts: Charts = ()
     notes: tuple[str, ...] = ()
 
 
@@ -122,6 +124,7 @@ def reduced(subject: Subject, flight: Trajectory, factor: float | None = None) -
         bodies=bodies,
         frames=frames,
         factor=factor,
+        charts=subject.charts,
         notes=tuple(note for note in (bent(machine, factor), words) if note),
     )
 

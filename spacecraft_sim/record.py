@@ -12,9 +12,10 @@ from uuid import uuid4
 
 import rerun as rr
 
-from spacecraft_sim import record_chart, record_scene, record_signals, record_text
+from spacecraft_sim import record_chart, record_law, record_scene, record_signals, record_text
 from spacecraft_sim.beneath import Beneath, Subject, channels
 from spacecraft_sim.changes import Channel, changes, rows_to_show
+from spacecraft_sim.chart import histories, spheres
 from spacecraft_sim.frames import at_rest, drawn_bodies, simulated, spacing, thinned
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.mjcf import BUS
@@ -110,6 +111,12 @@ class Recording:
         plotted = {signal for group in self._plots for signal in group.signals}
         self._bands = {signal: half for signal, half in wide if signal in plotted}
         self._planes = record_chart.planes(subject.charts, known, self._bands)
+        self._drawn = {
+            beneath.key: histories(beneath.charts, known[0]),
+            beneath.over_key: histories(subject.charts, known[-1]),
+        }
+        self._progress = dict.fromkeys(self._drawn, record_law.Progress())
+        self._spheres = spheres(subject.charts, known[0])
         longest = max(known, key=lambda flight: flight.time[-1])
         self._ends = {
             beneath.key: float(known[0].time[-1]),
@@ -127,11 +134,14 @@ class Recording:
             (beneath.key, beneath.name, True),
         ):
             record_signals.styles(stream, self._plots, key, name, under)
+            record_law.styles(stream, self._drawn[key], key, name, under)
+            record_law.arrow_styles(stream, self._spheres, key, under)
             color = record_signals.AXES["z"][under]
             record_chart.track_styles(stream, self._planes, key, color, under)
         record_signals.band_styles(stream, self._bands)
         record_chart.plane_frames(stream, self._planes, beneath.flight)
         record_chart.maps(stream, subject.charts)
+        record_law.globes(stream, self._spheres)
         self._channels = channels(beneath.flight, self._rest, subject.machine, known)
         both = bool(beneath.channels)
         record_signals.lane_styles(stream, self._channels, beneath.over_key if both else "", False)
@@ -203,6 +213,7 @@ class Recording:
         stream, before = self._stream, self._last.get(key, {})
         chosen = rows_to_show(part, self._channels, before)
         chosen[-1] |= part.time[-1] == self._ends[key]
+        self._draw_law(part, key)
         part = selected(part, chosen)
         if not len(part.time):
             return
@@ -216,6 +227,17 @@ class Recording:
         last = {name: float(value[-1]) for name, value in part.signals.items()}
         self._last[key] = {"time": float(part.time[-1]), **last}
 
+    def _draw_law(self, part: Trajectory, key: str) -> None:
+        stream, before = self._stream, self._progress[key]
+        every, end = record_law.spacing(max(self._ends.values())), self._ends[key]
+        wanted = record_law.shown_rows(part.time, every, before, end)
+        under = key == self._beneath.key
+        self._progress[key] = record_law.histories(
+            stream, self._drawn[key], part, wanted, key, under, before
+        )
+        if wanted.any():
+            record_law.arrows(stream, self._spheres, selected(part, wanted), key, before.row)
+
     def _send_layout(self) -> None:
         """The file opens at rest; a viewer that is open follows the flight."""
         beneath = self._beneath
@@ -226,6 +248,8 @@ class Recording:
             ends=self._ends,
             planes=self._planes,
             charts=self._subject.charts,
+            histories=tuple({h.name: h for key in self._drawn for h in self._drawn[key]}.values()),
+            spheres=self._spheres,
             groups=self._plots,
             bands=self._bands,
             relays=any(not channel.thruster.proportional for channel in self._channels),

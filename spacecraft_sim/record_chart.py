@@ -225,19 +225,28 @@ def tracks(
             points, time = np.vstack([last, points]), np.r_[before["time"], part.time]
         else:
             time = part.time
-        starts, strips = _strips(portrait, time, points)
+        (x, y), pieces = portrait.signals, 1
+        if y == x.replace("angle", "rate") and len(time) > 1:  # curved between the rows
+            pieces = PIECES
+            between = between_rows(time, *points.T, pieces=pieces)
+            points = np.vstack([between[:, :-1].reshape(-1, 2), points[-1:]])
+        starts, parts = strips(time, points, pieces)
         times = [rr.TimeColumn(TIMELINE, duration=starts)]
-        stream.send_columns(f"{path}/track", times, rr.LineStrips2D.columns(strips=strips))
+        stream.send_columns(f"{path}/track", times, rr.LineStrips2D.columns(strips=parts))
 
 
-def _strips(portrait: Portrait, time: Array, points: Array) -> tuple[Array, Array]:
-    """Start of each strip of a track, s, and its points, shape (n, k, 2)."""
-    x, y = portrait.signals
-    pieces = 1
-    if y == x.replace("angle", "rate") and len(time) > 1:  # curved between the rows
-        pieces = PIECES
-        between = between_rows(time, *points.T, pieces=pieces)
-        points = np.vstack([between[:, :-1].reshape(-1, 2), points[-1:]])
+def strips(time: Array, points: Array, pieces: int = 1) -> tuple[Array, Array]:
+    """Cuts a track into strips.
+
+    Args:
+        time: Times of the rows, shape (n,), s.
+        points: Points of the track, of which `pieces` lie from row to row, the last at a row,
+            shape (1 + (n - 1) pieces, m).
+        pieces: Into how many pieces the track is divided between two rows.
+
+    Returns:
+        Start of each strip, shape (k,), s, and its points, shape (k, STRIDE pieces + 1, m).
+    """
     long = STRIDE * pieces
     first = np.arange(0, max(len(points) - 1, 1), long)
     rows = np.minimum(first[:, None] + np.arange(long + 1), len(points) - 1)

@@ -9,19 +9,20 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spacecraft_sim import sphere
-from spacecraft_sim.chart import Arrow, Charts, Curve, History, Sphere, floor, path_of
-from spacecraft_sim.record_chart import NIGHT, STRIDE, strips
+from spacecraft_sim.chart import Arrow, Curve, History, Sphere, floor, path_of
+from spacecraft_sim.record_chart import NIGHT, strips
 from spacecraft_sim.record_scene import TIMELINE, Color, Stream
 from spacecraft_sim.record_signals import CURVES
 from spacecraft_sim.trajectory import Trajectory
 
 Array = np.ndarray
 
-HEAD = ((240, 242, 247), (255, 170, 64))  # what a history is about, and the same of the flight beneath
+HEAD = ((240, 242, 247), (255, 170, 64))  # of what a history is about, above and beneath
 GOAL, NET, GLOBE, BORDER = (98, 205, 132), (62, 67, 80), (30, 35, 48, 110), (98, 205, 132)
 OPPOSITE = (200, 70, 60)
 DISTANCE = 3.1  # of the eye from the middle of a sphere, in radii
 RADIUS = 0.985  # of the globe, so that paths lie above it
+ROWS, CLOSEST, FURTHEST = 1000, 0.02, 0.1  # rows of a flight, and the time between two, s
 WIDE, THIN = 4.5, 1.6  # widths of curves, in points
 
 
@@ -32,15 +33,46 @@ class Progress:
     Attributes:
         memories: What each handed over, by its name.
         floors: Where its logarithmic axis ends, by its name.
+        row: Signals and `time` in the last row that was shown; empty before the first.
     """
 
     memories: Mapping[str, Any] = field(default_factory=dict)
     floors: Mapping[str, float] = field(default_factory=dict)
+    row: Mapping[str, float] = field(default_factory=dict)
 
 
-def styles(
-    stream: Stream, drawn: Sequence[History], key: str, name: str, beneath: bool
-) -> None:
+def spacing(duration: float) -> float:
+    """Returns the time between two rows that are shown of a flight, s.
+
+    Args:
+        duration: Its length, s.
+    """
+    return min(max(duration / ROWS, CLOSEST), FURTHEST)
+
+
+def shown_rows(time: Array, every: float, before: Progress, end: float) -> Array:
+    """Returns which rows of a part are shown, shape (n,): one at times, and that at the end.
+
+    Args:
+        time: Times of the rows, shape (n,), s.
+        every: Time between two rows that are shown, s.
+        before: What was shown before.
+        end: End of the flight, s.
+    """
+    place = np.floor(time / every + 1e-6)
+    last = np.floor(before.row["time"] / every + 1e-6) if before.row else -1.0
+    return (np.diff(place, prepend=last) > 0) | (time == end)
+
+
+def _last(part: Trajectory, wanted: Array, before: Progress) -> Mapping[str, float]:
+    rows = np.flatnonzero(wanted)
+    if not len(rows):
+        return before.row
+    row = {name: float(value[rows[-1]]) for name, value in part.signals.items()}
+    return {"time": float(part.time[rows[-1]]), **row}
+
+
+def styles(stream: Stream, drawn: Sequence[History], key: str, name: str, beneath: bool) -> None:
     """Logs how the histories of a flight look.
 
     Args:
@@ -87,6 +119,7 @@ def histories(
         How far they are now.
     """
     memories, floors = dict(before.memories), dict(before.floors)
+    row = _last(part, wanted, before)
     for history in drawn:
         if beneath and not history.heads:
             continue
@@ -105,7 +138,7 @@ def histories(
             powers = np.log10(np.maximum(shown, low)).astype(np.float32)
             scalars = rr.Scalars.columns(scalars=powers.ravel()).partition(counts)
             stream.send_columns(f"{_path(history, True)}/{key}", times, scalars)
-    return Progress(memories=memories, floors=floors)
+    return Progress(memories=memories, floors=floors, row=row)
 
 
 def history_views(drawn: Sequence[History], logarithmic: bool) -> list[rrb.TimeSeriesView]:
@@ -209,7 +242,7 @@ def arrows(
             if before:
                 last = [before[name] for name in arrow.signals]
                 points, time = np.vstack([last, points]), np.r_[before["time"], time]
-            starts, pieces = strips(time, points, STRIDE)
+            starts, pieces = strips(time, points)
             times = [rr.TimeColumn(TIMELINE, duration=starts)]
             stream.send_columns(f"{path}/track", times, rr.LineStrips3D.columns(strips=pieces))
 

@@ -8,8 +8,9 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from spacecraft_sim.chart import Charts
+from spacecraft_sim.chart import Charts, History, Sphere
 from spacecraft_sim.record_chart import NIGHT, Plane, map_views, plane_views
+from spacecraft_sim.record_law import history_views, sphere_views
 from spacecraft_sim.record_scene import TIMELINE
 from spacecraft_sim.record_signals import band_path
 from spacecraft_sim.signal_groups import Group
@@ -34,6 +35,8 @@ class Layout:
         groups: What is plotted.
         planes: Phase planes.
         charts: What the law draws.
+        histories: What it draws over time.
+        spheres: Where it draws directions.
         bands: Half-widths that signals are to keep, by signal, the widest first, rad.
         relays: Whether there are channels with levels.
         upright: Whether the machine stands on the ground, to be seen from the side.
@@ -49,6 +52,8 @@ class Layout:
     groups: Sequence[Group]
     planes: Sequence[Plane]
     charts: Charts
+    histories: Sequence[History]
+    spheres: Sequence[Sphere]
     bands: Mapping[str, float]
     relays: bool
     upright: bool
@@ -134,6 +139,8 @@ def _histories(layout: Layout) -> rrb.Vertical:
         kept = [g for g in groups if any(signal in paths for signal in g.signals)]
         if kept:
             rows.append(rrb.Tabs(*(_kept(group, layout.bands, paths) for group in kept)))
+    if views := history_views(layout.histories, logarithmic=False):
+        rows.append(rrb.Tabs(*views))
     return rrb.Vertical(*rows)
 
 
@@ -148,7 +155,10 @@ def _near_and_planes(layout: Layout, following: bool) -> rrb.Vertical:
     views = plane_views(layout.planes, layout.ends, following)
     firsts = [v for v, plane in zip(views, layout.planes, strict=True) if plane.word == "whole"]
     others = [v for v, plane in zip(views, layout.planes, strict=True) if plane.word != "whole"]
-    upper = [rrb.Tabs(*found) for found in ([*firsts, *map_views(layout.charts)], others) if found]
+    spheres = sphere_views(layout.spheres, list(layout.ends))
+    energies = history_views(layout.histories, logarithmic=True)
+    found = (spheres, energies, [*firsts, *map_views(layout.charts)], others)
+    upper = [rrb.Tabs(*views) for views in found if views]
     near = min(NEAR, layout.duration / 10)
     thrust = [
         _plot("thrust", "Thrust near the cursor [N or N m]", near=near),

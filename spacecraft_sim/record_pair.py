@@ -49,6 +49,7 @@ def write(path: Path, compared: Pair, factor: float | None = None) -> None:
         frames=frames,
         factor=factor,
         channels=channels(a.flight, rest, below.machine, (a.flight, b.flight)),
+        charts=below.charts,
         notes=tuple(x for x in (bent(above.machine, factor), "Translucent: run A.") if x),
     )
     record.write(path, subject, b.flight, beneath, b.verdicts, page(compared, beneath.notes))
