@@ -20,6 +20,7 @@ from spacecraft_sim.trajectory import Trajectory, selected
 Array = np.ndarray
 
 SPACING = 0.1  # time between two frames, s, of which a flight has some, and not too many
+QUICKEST = 0.02  # closer ones no screen shows, s
 FEWEST, MOST = 1000, 18_000
 FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 POINTS = 9  # of the ghost's booms
@@ -72,7 +73,7 @@ def spacing(flight: Trajectory) -> float:
         flight: The flight.
     """
     end = float(flight.time[-1])
-    return min(max(SPACING, end / MOST), end / FEWEST) or SPACING
+    return min(max(SPACING, end / MOST), max(end / FEWEST, QUICKEST))
 
 
 def thinned(part: Trajectory, every: float) -> Trajectory:

@@ -10,13 +10,23 @@ from pathlib import Path
 from types import TracebackType
 from uuid import uuid4
 
+import numpy as np
 import rerun as rr
 
 from spacecraft_sim import record_chart, record_law, record_scene, record_signals, record_text
 from spacecraft_sim.beneath import Beneath, Subject, channels
 from spacecraft_sim.changes import Channel, changes, rows_to_show
 from spacecraft_sim.chart import histories, spheres
-from spacecraft_sim.frames import at_rest, drawn_bodies, simulated, spacing, thinned
+from spacecraft_sim.frames import (
+    Frames,
+    at_rest,
+    drawn_bodies,
+    posed,
+    read_joints,
+    simulated,
+    spacing,
+    thinned,
+)
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.mjcf import BUS
 from spacecraft_sim.record_layout import Layout, blueprint
@@ -26,6 +36,7 @@ from spacecraft_sim.trajectory import Trajectory, selected
 APPLICATION = "spacecraft_sim"
 PATIENCE = 5.0  # how long a viewer may take for a chunk before the run goes on without it, s
 CHUNK = 1000  # rows of a flight that is over
+LOOKS = 60  # instants of a flight at which it is looked how far an arm reaches
 PLUME = 0.25  # longest plume, in sizes of the spacecraft
 
 
@@ -105,8 +116,13 @@ class Recording:
         """
         stream, known, subject = self._stream, beneath.known, self._subject
         self._beneath = beneath
+        upright = BUS not in self._rest.positions
         self._size = record_scene.extent(self._rest)
-        self._plots = groups(known, list(self._rest.booms))
+        middle, radius = record_scene.ball(self._rest, self._poses(known) if upright else ())
+        record_scene.ruler(stream, self._rest, middle, radius, upright)
+        self._spheres = spheres(subject.charts, known[0])
+        vectors = [a.name for chart in self._spheres for a in chart.arrows] or ("s2", "s3")
+        self._plots = groups(known, list(self._rest.booms), vectors)
         wide = sorted(subject.bands.items(), key=lambda band: -band[1])
         plotted = {signal for group in self._plots for signal in group.signals}
         self._bands = {signal: half for signal, half in wide if signal in plotted}
@@ -116,13 +132,13 @@ class Recording:
             beneath.over_key: histories(subject.charts, known[-1]),
         }
         self._progress = dict.fromkeys(self._drawn, record_law.Progress())
-        self._spheres = spheres(subject.charts, known[0])
         longest = max(known, key=lambda flight: flight.time[-1])
         self._ends = {
             beneath.key: float(known[0].time[-1]),
             beneath.over_key: float(known[-1].time[-1]),
         }
         self._every = spacing(longest)
+        self._apart = record_law.spacing(max(self._ends.values()))
         self._edge_to_edge = min(0.05, float(longest.time[-1]) / 1500) or 1.0
         self._edges, self._end = 0, 0.0
         root, other = self._root(beneath.over_key), self._root(beneath.key)
@@ -147,7 +163,7 @@ class Recording:
         record_signals.lane_styles(stream, self._channels, beneath.over_key if both else "", False)
         record_signals.lane_styles(stream, beneath.channels, beneath.key, True)
         self._document("verdicts", record_text.unjudged_page(subject.title, beneath.notes))
-        self._send_layout()
+        self._send_layout(middle, radius)
         self._flush()
 
     def take(self, part: Trajectory) -> None:
@@ -208,7 +224,11 @@ class Recording:
             self._shown = stop
 
     def _signals(
-        self, part: Trajectory, key: str, found: Sequence[Channel], nozzles: dict[str, list[str]]
+        self,
+        part: Trajectory,
+        key: str,
+        found: Sequence[Channel],
+        nozzles: dict[str, list[record_scene.Nozzle]],
     ) -> None:
         stream, before = self._stream, self._last.get(key, {})
         chosen = rows_to_show(part, self._channels, before)
@@ -223,14 +243,13 @@ class Recording:
         lanes = key if self._beneath.channels else ""
         record_signals.lanes(stream, happened, lanes)
         record_signals.events(stream, happened, lanes)
-        record_scene.plumes(stream, nozzles, happened, PLUME * self._size)
+        record_scene.plumes(stream, nozzles, happened, PLUME * self._size, self._apart)
         last = {name: float(value[-1]) for name, value in part.signals.items()}
         self._last[key] = {"time": float(part.time[-1]), **last}
 
     def _draw_law(self, part: Trajectory, key: str) -> None:
         stream, before = self._stream, self._progress[key]
-        every, end = record_law.spacing(max(self._ends.values())), self._ends[key]
-        wanted = record_law.shown_rows(part.time, every, before, end)
+        wanted = record_law.shown_rows(part.time, self._apart, before, self._ends[key])
         under = key == self._beneath.key
         self._progress[key] = record_law.histories(
             stream, self._drawn[key], part, wanted, key, under, before
@@ -238,11 +257,22 @@ class Recording:
         if wanted.any():
             record_law.arrows(stream, self._spheres, selected(part, wanted), key, before.row)
 
-    def _send_layout(self) -> None:
+    def _poses(self, known: Sequence[Trajectory]) -> list[Frames]:
+        """Some frames of the flights whose readings say where every joint is."""
+        subject, found = self._subject, []
+        for flight in known:
+            if joints := read_joints(subject.model, flight):
+                rows = np.linspace(0, len(flight.time) - 1, LOOKS).astype(int)
+                part = selected(flight, rows)
+                found.append(posed(subject.model, subject.machine, part, joints, 1.0))
+        return found
+
+    def _send_layout(self, middle: np.ndarray, radius: float) -> None:
         """The file opens at rest; a viewer that is open follows the flight."""
         beneath = self._beneath
         layout = Layout(
-            extent=self._size,
+            middle=middle,
+            radius=radius,
             factor=beneath.factor,
             ghost=beneath.name,
             ends=self._ends,

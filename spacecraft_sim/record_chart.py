@@ -12,6 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spacecraft_sim.chart import Charts, Line, Map, Portrait, portraits
+from spacecraft_sim.labels import spread
 from spacecraft_sim.record_scene import TIMELINE, Color, Stream
 from spacecraft_sim.trajectory import Trajectory, between_rows, moving_axes
 
@@ -25,7 +26,9 @@ STRIDE = 10  # rows to a strip of a track: a view shows or leaves out whole stri
 FINAL = 60.0  # the end of a flight, shown on its own, s
 RESTING = 1e-9  # share of the window of a flight below which its end shows rounding alone
 PIECES = 4  # into which a track is divided between two rows
-FAR = 4.0  # how far lines are drawn, in half-widths of the window
+FAR = 4.0  # how far a band is drawn, in half-widths of the window
+EDGE = np.array([1.08, 1.2])  # how far lines are drawn, likewise
+MARGIN = (2.1, 3.1)  # middle and end of what is to the right of the window, likewise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,12 +137,12 @@ def plane_frames(stream: Stream, drawn: Sequence[Plane], flight: Trajectory) -> 
         axes = rr.LineStrips2D(cross, colors=AXIS, radii=-0.7, draw_order=2.0)
         stream.log(f"{plane.origin}/axes", axes, static=True)
         labels = [
-            f"{_words(name)} {_range(middle, half)} {flight.units[name]}"
-            for name, middle, half in zip(portrait.signals, plane.centre, plane.half, strict=True)
+            f"{word}: {_words(name)} {_range(middle, half)} {flight.units[name]}"
+            for word, name, middle, half in zip(
+                ("x", "y"), portrait.signals, plane.centre, plane.half, strict=True
+            )
         ]
-        places = [(1.6, -0.07), (0.9, -1.12)]
-        ticks = rr.Points2D(places, labels=labels, colors=TICK, radii=-0.1)
-        stream.log(f"{plane.origin}/scale", ticks, static=True)
+        _scale(stream, plane.origin, labels)
         if portrait.band:
             middle = plane.placed(np.zeros((1, 2)))[0, 0]
             line = [[(middle, -FAR), (middle, FAR)]]
@@ -149,30 +152,52 @@ def plane_frames(stream: Stream, drawn: Sequence[Plane], flight: Trajectory) -> 
             outline = plane.placed(np.vstack([region.outline, region.outline[:1]]))
             path = f"{plane.origin}/regions/{_slug(region.name)}"
             _line(stream, path, outline, REGIONS[k % len(REGIONS)], 1.0)
-        for k, line in enumerate(portrait.lines):
-            path = f"{plane.origin}/lines/{k}_{_slug(line.name)}"
-            share = (k + 1) / (len(portrait.lines) + 1)
-            _log_line(stream, path, line, plane.placed(line.points), share)
+        # The viewer counts in single precision: what is outside the window is cut off.
+        pieces = [_inside(plane.placed(line.points), EDGE) for line in portrait.lines]
+        for k, (line, drawn) in enumerate(zip(portrait.lines, pieces, strict=True)):
+            if len(drawn):
+                width = 1.6 if line.look == "bound" else 1.1
+                look = {"colors": COLORS[line.look], "radii": -width, "draw_order": 10.0}
+                strips = rr.LineStrips2D(list(drawn), **look)
+                stream.log(_line_path(plane.origin, k, line), strips, static=True)
+        _line_names(stream, plane.origin, portrait.lines, pieces)
 
 
 def _range(middle: float, half: float) -> str:
-    return f"{middle:.4g} ± {half:.3g}" if middle else f"{half:.3g}"
+    return f"{middle:.4g} ± {half:.3g}" if middle else f"± {half:.3g}"
 
 
-def _log_line(stream: Stream, path: str, line: Line, points: Array, share: float) -> None:
-    """A line of the law with its name at a share of the way through the window.
+def _scale(stream: Stream, origin: str, labels: Sequence[str]) -> None:
+    """What the axes are, in the margin to the right of the window."""
+    places = [(MARGIN[0], -1.0 + 0.28 * k) for k in range(len(labels))]
+    words = rr.Points2D(places, labels=labels, colors=TICK, radii=-0.1)
+    stream.log(f"{origin}/scale", words, static=True)
 
-    The viewer counts in single precision: what is far outside the window is cut off.
-    """
-    color = COLORS[line.look]
-    if len(pieces := _inside(points, np.array([FAR, FAR]))):
-        width = 1.6 if line.look == "bound" else 1.1
-        drawn = rr.LineStrips2D(list(pieces), colors=color, radii=-width, draw_order=10.0)
-        stream.log(path, drawn, static=True)
-    if len(seen := _inside(points, np.array([1.2, 0.95]))):
-        place = seen[0, 0] + share * (seen[0, 1] - seen[0, 0])
-        name = rr.Points2D([place], labels=[line.name], colors=color, radii=-0.1)
-        stream.log(f"{path}/name", name, static=True)
+
+def _line_names(
+    stream: Stream, origin: str, lines: Sequence[Line], pieces: Sequence[Array]
+) -> None:
+    """Names of lines, each name once, where they do not cover each other."""
+    first = {line.name: k for k, line in reversed([*enumerate(lines)])}
+    ranks = sorted(first.values())
+    share = np.linspace(0, 1, 20)[:, None, None]
+    points = [
+        (pieces[k][:, 0] + share * (pieces[k][:, 1] - pieces[k][:, 0]))
+        .swapaxes(0, 1)
+        .reshape(-1, 2)
+        for k in ranks
+    ]
+    places = spread(points, [lines[k].name for k in ranks])
+    for k, place in zip(ranks, places, strict=True):
+        if place is not None:
+            line = lines[k]
+            look = {"colors": COLORS[line.look], "radii": -0.1}
+            name = rr.Points2D([place], labels=[line.name], **look)
+            stream.log(f"{_line_path(origin, k, line)}/name", name, static=True)
+
+
+def _line_path(origin: str, k: int, line: Line) -> str:
+    return f"{origin}/lines/{k}_{_slug(line.name)}"
 
 
 def track_styles(
@@ -275,11 +300,25 @@ def maps(stream: Stream, charts: Charts) -> None:
         for k, region in enumerate(chart.regions):
             outline = placed(np.vstack([region.outline, region.outline[:1]]))
             name = f"{path}/regions/{_slug(region.name)}"
-            _line(stream, name, outline, REGIONS[k % len(REGIONS)], 1.5, region.name)
+            _line(stream, name, outline, REGIONS[k % len(REGIONS)], 1.5)
         for k, line in enumerate(chart.lines):
             for n, piece in enumerate(_pieces(placed(line.points))):
                 name = f"{path}/lines/{k}_{n}_{_slug(line.name)}"
-                _line(stream, name, piece, COLORS[line.look], 1.0, None if n else line.name)
+                _line(stream, name, piece, COLORS[line.look], 1.0)
+        _line_names(
+            stream, path, chart.lines, [_inside(placed(x.points), EDGE) for x in chart.lines]
+        )
+        ranges = [f"{a:.3g} to {b:.3g}" for a, b in zip(low, high, strict=True)]
+        words = [
+            f"{word}: {label} {span}"
+            for word, label, span in zip(("x", "y"), chart.labels, ranges, strict=True)
+        ]
+        _scale(stream, path, words)
+        for k, region in enumerate(chart.regions):
+            place = [(MARGIN[0], -0.3 + 0.28 * k)]
+            look = {"colors": REGIONS[k % len(REGIONS)], "radii": -0.1}
+            name = rr.Points2D(place, labels=[region.name], **look)
+            stream.log(f"{path}/regions/{_slug(region.name)}/name", name, static=True)
         here = rr.Points2D(placed(np.array([chart.point])), colors=HERE, radii=-6.0)
         stream.log(f"{path}/here", here, static=True)
 
@@ -311,7 +350,7 @@ def plane_views(
                 origin=plane.origin,
                 contents=["+ $origin/**", *(f"+ /{path}/**" for path in shown)],
                 name=f"Phase plane, {plane.title}",
-                visual_bounds=rrb.VisualBounds2D(x_range=[-1.5, 2.4], y_range=[-1.2, 1.2]),
+                visual_bounds=rrb.VisualBounds2D(x_range=[-1.1, MARGIN[1]], y_range=[-1.2, 1.2]),
                 background=NIGHT,
                 overrides={f"{path}/track": [times] for path, times in shown.items()},
             )
@@ -325,7 +364,7 @@ def map_views(charts: Charts) -> list[rrb.Spatial2DView]:
     Args:
         charts: What the law draws.
     """
-    bounds = rrb.VisualBounds2D(x_range=[-1.1, 1.1], y_range=[-1.1, 1.1])
+    bounds = rrb.VisualBounds2D(x_range=[-1.1, MARGIN[1]], y_range=[-1.2, 1.2])
     look = {"visual_bounds": bounds, "background": NIGHT}
     return [
         rrb.Spatial2DView(origin=f"maps/{_slug(chart.name)}", name=chart.title, **look)
@@ -355,11 +394,8 @@ def _inside(points: Array, box: Array) -> Array:
     return start[cut, None] + ends.T[cut, :, None] * way[cut, None]
 
 
-def _line(
-    stream: Stream, path: str, points: Array, color: Color, width: float, label: str | None = None
-) -> None:
-    labels = [label] if label else None
-    line = rr.LineStrips2D([points], colors=color, radii=-width, labels=labels, draw_order=10.0)
+def _line(stream: Stream, path: str, points: Array, color: Color, width: float) -> None:
+    line = rr.LineStrips2D([points], colors=color, radii=-width, draw_order=10.0)
     stream.log(path, line, static=True)
 
 

@@ -18,9 +18,9 @@ from spacecraft_sim.trajectory import Trajectory
 Array = np.ndarray
 
 HEAD = ((240, 242, 247), (255, 170, 64))  # of what a history is about, above and beneath
-GOAL, NET, GLOBE, BORDER = (98, 205, 132), (62, 67, 80), (30, 35, 48, 110), (98, 205, 132)
+GOAL, NET, GLOBE, BORDER = (98, 205, 132), (62, 67, 80), (30, 35, 48, 170), (98, 205, 132)
 OPPOSITE = (200, 70, 60)
-DISTANCE = 3.1  # of the eye from the middle of a sphere, in radii
+DISTANCE = 2.6  # of the eye from the middle of a sphere, in radii
 RADIUS = 0.985  # of the globe, so that paths lie above it
 ROWS, CLOSEST, FURTHEST = 1000, 0.02, 0.1  # rows of a flight, and the time between two, s
 WIDE, THIN = 4.5, 1.6  # widths of curves, in points
@@ -135,7 +135,7 @@ def histories(
         scalars = rr.Scalars.columns(scalars=shown.ravel()).partition(counts)
         stream.send_columns(f"{_path(history, False)}/{key}", times, scalars)
         if history.decades:
-            powers = np.log10(np.maximum(shown, low)).astype(np.float32)
+            powers = np.log10(np.where(shown >= low, shown, np.nan)).astype(np.float32)
             scalars = rr.Scalars.columns(scalars=powers.ravel()).partition(counts)
             stream.send_columns(f"{_path(history, True)}/{key}", times, scalars)
     return Progress(memories=memories, floors=floors, row=row)
@@ -184,7 +184,7 @@ def globes(stream: Stream, drawn: Sequence[Sphere]) -> None:
         names = rr.Points3D(ends, labels=["x", "y", "z"], colors=NET, radii=-0.1)
         stream.log(f"{path}/axes/names", names, static=True)
         for k, arrow in enumerate(chart.arrows):
-            target, color = np.array(arrow.target), CURVES[k % len(CURVES)][0]
+            target, color = np.array(arrow.target), CURVES[k % len(CURVES)][1]
             words = f"goal of {arrow.name}"
             goal = rr.Points3D([target], labels=[words], colors=GOAL, radii=-6.0)
             stream.log(f"{path}/goals/{arrow.name}", goal, static=True)

@@ -16,6 +16,7 @@ from spacecraft_sim.record_signals import band_path
 from spacecraft_sim.signal_groups import Group
 
 NEAR = 8.0  # half-width of the plots that follow the cursor, s, or a tenth of the flight
+LONG, ROUND = 1.85, 2.9  # distance of the eye in radii of the ball, for booms and for all else
 MINUTE = 60.0  # which a playback lasts at least, if it is faster than real time, s
 DOCUMENTS = ("verdicts", "scenario")
 
@@ -25,7 +26,8 @@ class Layout:
     """What a layout depends on.
 
     Attributes:
-        extent: Size of the spacecraft, m.
+        middle: Middle of the ball that holds what moves, shape (3,), m.
+        radius: Its radius, m.
         factor: How many times too far the booms are drawn bent.
         booms: Whether there are any.
         ghost: Name of the flight that is drawn translucent.
@@ -42,7 +44,8 @@ class Layout:
         upright: Whether the machine stands on the ground, to be seen from the side.
     """
 
-    extent: float
+    middle: np.ndarray
+    radius: float
     factor: float
     booms: bool
     ghost: str
@@ -80,8 +83,9 @@ def blueprint(layout: Layout, *, following: bool) -> rrb.Blueprint:
 
 
 def _space(layout: Layout) -> rrb.Spatial3DView:
-    eye = layout.extent * np.array([0.0, -1.9, 0.5] if layout.upright else [0.0, -1.15, 1.45])
-    eye *= 1.0 if layout.booms or layout.upright else 1.4  # booms are long and thin
+    eye = np.array([0.0, -1.9, 0.5] if layout.upright else [0.0, -1.15, 1.45])
+    # Booms are long and thin: they fit where the ball about them does not.
+    eye *= layout.radius * (LONG if layout.booms else ROUND) / np.linalg.norm(eye)
     words = ["Motion"] if not layout.booms else [f"Bending x {layout.factor:g}, grey: unbent"]
     words += [f"translucent: {layout.ghost}"] if layout.drawn else []
     return rrb.Spatial3DView(
@@ -89,7 +93,9 @@ def _space(layout: Layout) -> rrb.Spatial3DView:
         name=f"{'; '.join(words)} [m]",
         background=NIGHT,
         line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(position=eye, look_target=[0, 0, 0], eye_up=[0, 0, 1]),
+        eye_controls=rrb.EyeControls3D(
+            position=layout.middle + eye, look_target=layout.middle, eye_up=[0, 0, 1]
+        ),
     )
 
 

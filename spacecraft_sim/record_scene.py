@@ -1,13 +1,15 @@
 """The spacecraft in 3D: solids, bending booms, a ghost, plumes that light when a thruster fires."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
 
 from spacecraft_sim.changes import Changes, Channel
-from spacecraft_sim.drawing import Drawing, Jet, Shape, boom_points, turned
+from spacecraft_sim.drawing import Drawing, Shape, boom_points, turned
 from spacecraft_sim.frames import Frames
+from spacecraft_sim.sketch import exhausts, surface
 
 Array = np.ndarray
 Stream = rr.RecordingStream
@@ -27,7 +29,7 @@ GHOST = 60  # opacity of a ghost's solids, of 255
 
 
 def setting(stream: Stream, rest: Drawing) -> None:
-    """Logs what never moves: the reference configuration and a ruler.
+    """Logs what never moves: the directions of the booms in the reference configuration.
 
     Args:
         stream: The recording.
@@ -38,11 +40,23 @@ def setting(stream: Stream, rest: Drawing) -> None:
     if straight:
         look = {"colors": FAINT, "radii": -1.0}  # negative: in points of the screen
         stream.log("world/attitude_zero", rr.LineStrips3D(straight, **look), static=True)
-    size = extent(rest)
-    length = max(m for m in RULERS if m <= size or m == RULERS[0])
+
+
+def ruler(stream: Stream, rest: Drawing, middle: Array, radius: float, upright: bool) -> None:
+    """Logs a ruler of a round length: beside the machine, or beneath one that stands upright.
+
+    Args:
+        stream: The recording.
+        rest: The machine in its reference configuration.
+        middle: Middle of the ball that holds it, shape (3,), m.
+        radius: Radius of that ball, m.
+        upright: Whether it is seen from the side.
+    """
+    length = max(m for m in RULERS if m <= radius or m == RULERS[0])
     wide = max((np.max(np.abs(s.position)) + np.max(s.size) for s in rest.shapes), default=0.0)
-    aside = min(0.55 * size + 0.3 * wide, 1.1 * size)
-    ends = [(x, -aside, 0.0) for x in (-length / 2, length / 2)]
+    aside = min(0.55 * radius + 0.3 * wide, 1.1 * radius)
+    away = np.array([0.0, 0.0, -radius] if upright else [0.0, -aside, 0.0])
+    ends = [middle + away + (x, 0.0, 0.0) for x in (-length / 2, length / 2)]
     line = rr.LineStrips3D([ends], labels=[f"{length:g} m"], colors=GREY, radii=-1.0)
     stream.log("world/ruler", line, static=True)
 
@@ -122,57 +136,106 @@ def extent(rest: Drawing) -> float:
         rest: The machine in its reference configuration.
     """
     centre = next(iter(rest.positions.values()))[0]
-    tips = [boom_points(rest, boom)[0][0, -1] for boom in rest.booms]
-    reach = [float(np.linalg.norm(tip - centre)) for tip in tips]
-    for shape in rest.shapes:
-        middle = rest.positions[shape.body][0]
-        middle = middle + turned(rest.quaternions[shape.body][0], shape.position)
-        size = np.linalg.norm(shape.size) if shape.kind == "box" else np.max(shape.size)
-        reach.append(float(np.linalg.norm(middle - centre) + size))
-    return max(*reach, 0.01) if reach else 1.0
+    return float(np.linalg.norm(_points(rest) - centre, axis=1).max(initial=0.01))
 
 
-def nozzles(stream: Stream, root: str, rest: Drawing) -> dict[str, list[str]]:
-    """Logs the exhaust of every jet, still out, and returns the paths of each channel's plumes.
+def ball(rest: Drawing, shown: Sequence[Frames]) -> tuple[Array, float]:
+    """Returns middle, shape (3,), and radius of a ball that holds a machine in some frames, m.
+
+    Args:
+        rest: The machine in its reference configuration, for its shapes.
+        shown: The frames; without any, the ball is about the first body.
+    """
+    found = [
+        (turned(f.quaternions[s.body][:, None], surface(s)) + f.positions[s.body][:, None])
+        for f in shown
+        for s in rest.shapes
+        if s.body in f.positions
+    ]
+    if not found:
+        return next(iter(rest.positions.values()))[0], extent(rest)
+    points = np.vstack([x.reshape(-1, 3) for x in found])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return middle, float(np.linalg.norm(points - middle, axis=1).max())
+
+
+def _points(rest: Drawing) -> Array:
+    """Points whose hull is the machine, tips of booms among them, shape (n, 3)."""
+    tips = [boom_points(rest, boom)[0][0, -1:] for boom in rest.booms]
+    shapes = [
+        rest.positions[s.body][0] + turned(rest.quaternions[s.body][0], surface(s))
+        for s in rest.shapes
+    ]
+    return np.vstack([np.zeros((0, 3)), *tips, *shapes])
+
+
+class Nozzle(NamedTuple):
+    """Where the plume of a jet is logged.
+
+    Attributes:
+        path: Path of the plume.
+        through: How far it is through the hull to where exhaust leaves at a negative thrust, m.
+    """
+
+    path: str
+    through: float
+
+
+def nozzles(stream: Stream, root: str, rest: Drawing) -> dict[str, list[Nozzle]]:
+    """Logs the exhaust of every jet, still out, and returns the plumes of each channel.
 
     Args:
         stream: The recording.
         root: Path of the flight's scene.
         rest: The machine in its reference configuration.
     """
-    paths: dict[str, list[str]] = {}
+    found: dict[str, list[Nozzle]] = {}
     for k, jet in enumerate(rest.jets):
-        for n, (point, force) in enumerate(_nozzles(jet, rest)):
+        ways = (exhausts(jet, rest.shapes, level) for level in (1.0, -1.0))
+        for n, ((point, away), (opposite, _)) in enumerate(zip(*ways, strict=True)):
             path = f"{root}/{jet.body}/jets/{jet.channel}_{k}_{n}"
-            side = np.cross(force, np.eye(3)[np.argmin(np.abs(force))])
+            side = np.cross(away, np.eye(3)[np.argmin(np.abs(away))])
             side /= np.linalg.norm(side)
-            frame = np.stack([side, np.cross(side, force), -force], axis=1)
+            frame = np.stack([side, np.cross(away, side), away], axis=1)
             stream.log(path, rr.Transform3D(translation=point, mat3x3=frame), static=True)
             stream.log(f"{path}/plume", _cone(), static=True)
-            paths.setdefault(jet.channel, []).append(f"{path}/plume")
-    return paths
+            nozzle = Nozzle(f"{path}/plume", float(np.linalg.norm(point - opposite)))
+            found.setdefault(jet.channel, []).append(nozzle)
+    return found
 
 
 def plumes(
-    stream: Stream, paths: Mapping[str, Sequence[str]], found: Sequence[Changes], size: float
+    stream: Stream,
+    found: Mapping[str, Sequence[Nozzle]],
+    happened: Sequence[Changes],
+    size: float,
+    every: float,
 ) -> None:
     """Logs the plumes at the instants at which a thrust changes: longer at a higher level.
 
     Args:
         stream: The recording.
-        paths: Paths of the plumes of each channel.
-        found: The changes of commands and thrusts.
+        found: The plumes of each channel.
+        happened: The changes of commands and thrusts.
         size: Length of the longest plume, m.
+        every: Time between two rows of a thrust that changes all the time, s.
     """
-    for change in found:
+    for change in happened:
         if change.what == "command" or not len(change.time):
             continue
-        length = size * throttle(change.value, change.channel)
+        rows = np.ones(len(change.time), dtype=bool)
+        if change.channel.thruster.proportional:
+            rows[1:] = np.diff(np.floor(change.time / every + 1e-6)) > 0
+            rows[-1] = True
+        length = size * throttle(change.value[rows], change.channel)
         length[length == 0] = 1e-6  # a transform must have an inverse
         scale = np.stack([abs(length), abs(length), length], axis=1)
-        times = [rr.TimeColumn(TIMELINE, duration=change.time)]
-        for path in paths.get(change.channel.name, ()):
-            stream.send_columns(path, times, rr.Transform3D.columns(scale=scale))
+        times = [rr.TimeColumn(TIMELINE, duration=change.time[rows])]
+        for path, through in found.get(change.channel.name, ()):
+            poses = {"scale": scale}
+            if through > 0:
+                poses["translation"] = np.outer(length < 0, [0.0, 0.0, -through])
+            stream.send_columns(path, times, rr.Transform3D.columns(**poses))
 
 
 def throttle(thrust: Array, channel: Channel) -> Array:
@@ -189,18 +252,6 @@ def throttle(thrust: Array, channel: Channel) -> Array:
         return thrust / most
     share = np.log(np.maximum(np.abs(thrust), least) / least) / np.log(most / least)
     return np.sign(thrust) * (0.5 + 0.5 * share)
-
-
-def _nozzles(jet: Jet, rest: Drawing) -> list[tuple[Array, Array]]:
-    """Where a jet blows and the direction of its force; a pure torque is drawn as a pair."""
-    if np.any(jet.force):
-        return [(jet.position, jet.force / np.linalg.norm(jet.force))]
-    axis = jet.torque / np.linalg.norm(jet.torque)
-    shapes = [shape for shape in rest.shapes if shape.body == jet.body]
-    reach = max((max(np.abs(s.position)) + max(s.size) for s in shapes), default=1.0)
-    arm = reach * np.eye(3)[0 if abs(axis[0]) < 0.9 else 1]
-    force = np.cross(axis, arm) / np.linalg.norm(np.cross(axis, arm))
-    return [(jet.position + arm, force), (jet.position - arm, -force)]
 
 
 def _solid(kind: str, shapes: Sequence[Shape], ghost: bool) -> rr.AsComponents:

@@ -91,11 +91,13 @@ def band_styles(stream: Stream, bands: Mapping[str, float]) -> None:
 def band_path(k: int, signal: str) -> str:
     """Returns the path of a bound: lines are drawn over each other in the order of their paths.
 
+    That order is a reader's: digits come first, and capitals are as small letters are.
+
     Args:
         k: Rank of the bound, the widest first.
         signal: The signal.
     """
-    return f"Bounds/{k}_{signal}"
+    return f"0_bounds/{k}_{signal}"
 
 
 def band(

@@ -41,20 +41,23 @@ _VECTORS: tuple[tuple[str, str, Role], ...] = (
 )
 
 
-def groups(flights: Sequence[Trajectory], booms: Sequence[str]) -> tuple[Group, ...]:
+def groups(
+    flights: Sequence[Trajectory], booms: Sequence[str], vectors: Sequence[str] = ("s2", "s3")
+) -> tuple[Group, ...]:
     """Returns the groups of readings that all flights share.
 
     Args:
         flights: The flights.
         booms: Names of the booms.
+        vectors: Names of the fixed directions that are shown; of three orthogonal ones two say all.
     """
     names = [n for n in flights[0].signals if all(n in flight.signals for flight in flights)]
     found = []
     for kind, title, role in _VECTORS:
         axes = {f"{kind}_{axis}": axis for axis in "xyz"}
         found.append((kind, title, role, {n: axes[n] for n in axes if n in names}))
-    # Of three orthogonal directions two say all.
-    directions = {n: n.replace("_", " ") for n in names if n[:3] in ("s2_", "s3_") and len(n) == 4}
+    wanted = {f"{vector}_{axis}": f"{vector} {axis}" for vector in vectors for axis in "xyz"}
+    directions = {n: label for n, label in wanted.items() if n in names}
     found.append(("direction", "Fixed directions in the body", "position", directions))
     joints = {n: n.replace("_", " ") for n in names if f"{n}_rate" in names}
     found.append(("joint_angle", "Joint angles", "position", joints))
