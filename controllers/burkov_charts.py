@@ -87,7 +87,7 @@ class AtSamples:
                 f"the flight has no row at the sample of its law at {due:.6g} s: record them all"
             )
         columns = [
-            np.array([part[name][at] for name in names]).reshape(len(names), -1).T.tolist()
+            np.array([part[name][at] for name in names]).reshape(len(names), len(at)).T.tolist()
             for names in (self.law.sensors, self.moving)
         ]
         rows, found = [], []
@@ -172,7 +172,7 @@ def body_charts(
         estimates.append(_estimates(f"{name}_rate", title, "1/s", signals, measure))
     sphere = Sphere(
         name="vectors",
-        title="Body vectors on the unit sphere, principal axes",
+        title="s2, s3 on the unit sphere of the principal axes",
         arrows=tuple(arrows),
         bound="V can be below 2 min(k2, k3)",
     )
@@ -193,7 +193,7 @@ def spin_charts(
     """
     sphere = Sphere(
         name="direction",
-        title="s1 on the unit sphere, principal axes",
+        title="s1 on the unit sphere of the principal axes",
         arrows=(Arrow(name="s1", signals=direction, target=(1.0, 0.0, 0.0)),),
     )
     return (_energy(law, terms, (*direction, *rates)), sphere)

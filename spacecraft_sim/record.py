@@ -13,7 +13,14 @@ from uuid import uuid4
 import numpy as np
 import rerun as rr
 
-from spacecraft_sim import record_chart, record_law, record_scene, record_signals, record_text
+from spacecraft_sim import (
+    record_chart,
+    record_law,
+    record_scene,
+    record_signals,
+    record_text,
+    spans,
+)
 from spacecraft_sim.beneath import Beneath, Subject, channels
 from spacecraft_sim.changes import Channel, changes, rows_to_show
 from spacecraft_sim.chart import histories, spheres
@@ -36,6 +43,7 @@ from spacecraft_sim.trajectory import Trajectory, selected
 APPLICATION = "spacecraft_sim"
 PATIENCE = 5.0  # how long a viewer may take for a chunk before the run goes on without it, s
 CHUNK = 1000  # rows of a flight that is over
+Nozzles = dict[str, list[record_scene.Nozzle]]
 LOOKS = 60  # instants of a flight at which it is looked how far an arm reaches
 PLUME = 0.25  # longest plume, in sizes of the spacecraft
 
@@ -224,11 +232,7 @@ class Recording:
             self._shown = stop
 
     def _signals(
-        self,
-        part: Trajectory,
-        key: str,
-        found: Sequence[Channel],
-        nozzles: dict[str, list[record_scene.Nozzle]],
+        self, part: Trajectory, key: str, found: Sequence[Channel], nozzles: Nozzles
     ) -> None:
         stream, before = self._stream, self._last.get(key, {})
         chosen = rows_to_show(part, self._channels, before)
@@ -284,6 +288,7 @@ class Recording:
             bands=self._bands,
             relays=any(not channel.thruster.proportional for channel in self._channels),
             duration=max(self._ends.values()),
+            active=self._active(),
             booms=bool(self._rest.booms),
             drawn=bool(beneath.bodies),
             upright=BUS not in self._rest.positions,
@@ -296,6 +301,15 @@ class Recording:
             aside.send_blueprint(blueprint(layout, following=True))
             aside.flush(timeout_sec=self._patience)
             aside.disconnect()
+
+    def _active(self) -> float | None:
+        """Until when there is something to see of a machine that comes to rest, s."""
+        known = self._beneath.known
+        if any(not channel.thruster.proportional for channel in self._channels):
+            return None
+        signals = [name for group in self._plots for name in group.signals]
+        active = max(spans.transient(flight, signals) for flight in known)
+        return active if active < 0.7 * max(self._ends.values()) else None
 
     def _document(self, path: str, text: str) -> None:
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

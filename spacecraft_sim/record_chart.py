@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spacecraft_sim.chart import Charts, Line, Map, Portrait, portraits
-from spacecraft_sim.labels import spread
+from spacecraft_sim.plane_lines import inside, pieces, spread
 from spacecraft_sim.record_scene import TIMELINE, Color, Stream
 from spacecraft_sim.trajectory import Trajectory, between_rows, moving_axes
 
@@ -153,14 +153,14 @@ def plane_frames(stream: Stream, drawn: Sequence[Plane], flight: Trajectory) -> 
             path = f"{plane.origin}/regions/{_slug(region.name)}"
             _line(stream, path, outline, REGIONS[k % len(REGIONS)], 1.0)
         # The viewer counts in single precision: what is outside the window is cut off.
-        pieces = [_inside(plane.placed(line.points), EDGE) for line in portrait.lines]
-        for k, (line, drawn) in enumerate(zip(portrait.lines, pieces, strict=True)):
-            if len(drawn):
+        visible = [inside(plane.placed(line.points), EDGE) for line in portrait.lines]
+        for k, (line, seen) in enumerate(zip(portrait.lines, visible, strict=True)):
+            if len(seen):
                 width = 1.6 if line.look == "bound" else 1.1
                 look = {"colors": COLORS[line.look], "radii": -width, "draw_order": 10.0}
-                strips = rr.LineStrips2D(list(drawn), **look)
+                strips = rr.LineStrips2D(list(seen), **look)
                 stream.log(_line_path(plane.origin, k, line), strips, static=True)
-        _line_names(stream, plane.origin, portrait.lines, pieces)
+        _line_names(stream, plane.origin, portrait.lines, visible)
 
 
 def _range(middle: float, half: float) -> str:
@@ -175,18 +175,16 @@ def _scale(stream: Stream, origin: str, labels: Sequence[str]) -> None:
 
 
 def _line_names(
-    stream: Stream, origin: str, lines: Sequence[Line], pieces: Sequence[Array]
+    stream: Stream, origin: str, lines: Sequence[Line], visible: Sequence[Array]
 ) -> None:
     """Names of lines, each name once, where they do not cover each other."""
     first = {line.name: k for k, line in reversed([*enumerate(lines)])}
     ranks = sorted(first.values())
     share = np.linspace(0, 1, 20)[:, None, None]
-    points = [
-        (pieces[k][:, 0] + share * (pieces[k][:, 1] - pieces[k][:, 0]))
-        .swapaxes(0, 1)
-        .reshape(-1, 2)
-        for k in ranks
-    ]
+    points = []
+    for k in ranks:
+        start, end = visible[k][:, 0], visible[k][:, 1]
+        points.append((start + share * (end - start)).swapaxes(0, 1).reshape(-1, 2))
     places = spread(points, [lines[k].name for k in ranks])
     for k, place in zip(ranks, places, strict=True):
         if place is not None:
@@ -250,12 +248,12 @@ def tracks(
             points, time = np.vstack([last, points]), np.r_[before["time"], part.time]
         else:
             time = part.time
-        (x, y), pieces = portrait.signals, 1
+        (x, y), count = portrait.signals, 1
         if y == x.replace("angle", "rate") and len(time) > 1:  # curved between the rows
-            pieces = PIECES
-            between = between_rows(time, *points.T, pieces=pieces)
+            count = PIECES
+            between = between_rows(time, *points.T, pieces=count)
             points = np.vstack([between[:, :-1].reshape(-1, 2), points[-1:]])
-        starts, parts = strips(time, points, pieces)
+        starts, parts = strips(time, points, count)
         times = [rr.TimeColumn(TIMELINE, duration=starts)]
         stream.send_columns(f"{path}/track", times, rr.LineStrips2D.columns(strips=parts))
 
@@ -302,11 +300,11 @@ def maps(stream: Stream, charts: Charts) -> None:
             name = f"{path}/regions/{_slug(region.name)}"
             _line(stream, name, outline, REGIONS[k % len(REGIONS)], 1.5)
         for k, line in enumerate(chart.lines):
-            for n, piece in enumerate(_pieces(placed(line.points))):
+            for n, piece in enumerate(pieces(placed(line.points))):
                 name = f"{path}/lines/{k}_{n}_{_slug(line.name)}"
                 _line(stream, name, piece, COLORS[line.look], 1.0)
         _line_names(
-            stream, path, chart.lines, [_inside(placed(x.points), EDGE) for x in chart.lines]
+            stream, path, chart.lines, [inside(placed(x.points), EDGE) for x in chart.lines]
         )
         ranges = [f"{a:.3g} to {b:.3g}" for a, b in zip(low, high, strict=True)]
         words = [
@@ -375,23 +373,6 @@ def map_views(charts: Charts) -> list[rrb.Spatial2DView]:
 
 def _flight(portrait: Portrait, key: str) -> str:
     return f"phase/{_slug(portrait.name)}/flights/{key}"
-
-
-def _pieces(points: Array) -> list[Array]:
-    """A line without its breaks."""
-    broken = np.flatnonzero(np.isnan(points).any(axis=1))
-    parts = np.split(points, broken)
-    return [p for p in (part[~np.isnan(part).any(axis=1)] for part in parts) if len(p) > 1]
-
-
-def _inside(points: Array, box: Array) -> Array:
-    """The segments of a line cut to |x|, |y| <= box: their ends, shape (n, 2, 2)."""
-    start, way = points[:-1], np.diff(points, axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        bounds = np.sort([(-box - start) / way, (box - start) / way], axis=0)
-    ends = np.stack([np.maximum(bounds[0].max(axis=1), 0), np.minimum(bounds[1].min(axis=1), 1)])
-    cut = ends[0] < ends[1]  # not where a coordinate is NaN: a break, or a segment along an edge
-    return start[cut, None] + ends.T[cut, :, None] * way[cut, None]
 
 
 def _line(stream: Stream, path: str, points: Array, color: Color, width: float) -> None:

@@ -12,7 +12,7 @@ from spacecraft_sim import sphere
 from spacecraft_sim.chart import Arrow, Curve, History, Sphere, floor, path_of
 from spacecraft_sim.record_chart import NIGHT, strips
 from spacecraft_sim.record_scene import TIMELINE, Color, Stream
-from spacecraft_sim.record_signals import CURVES
+from spacecraft_sim.record_signals import CURVES, GREY
 from spacecraft_sim.trajectory import Trajectory
 
 Array = np.ndarray
@@ -20,7 +20,7 @@ Array = np.ndarray
 HEAD = ((240, 242, 247), (255, 170, 64))  # of what a history is about, above and beneath
 GOAL, NET, GLOBE, BORDER = (98, 205, 132), (62, 67, 80), (30, 35, 48, 170), (98, 205, 132)
 OPPOSITE = (200, 70, 60)
-DISTANCE = 2.6  # of the eye from the middle of a sphere, in radii
+DISTANCE = 2.75  # of the eye from the middle of a sphere, in radii
 RADIUS = 0.985  # of the globe, so that paths lie above it
 ROWS, CLOSEST, FURTHEST = 1000, 0.02, 0.1  # rows of a flight, and the time between two, s
 WIDE, THIN = 4.5, 1.6  # widths of curves, in points
@@ -92,7 +92,7 @@ def styles(stream: Stream, drawn: Sequence[History], key: str, name: str, beneat
                 widths=[_width(c, beneath) for c in shown],
                 aggregation_policy="MinMax",
             )
-            stream.log(f"{_path(history, logarithmic)}/{key}", look, static=True)
+            stream.log(f"{history_path(history, logarithmic)}/{key}", look, static=True)
 
 
 def histories(
@@ -133,35 +133,22 @@ def histories(
         shown = values[:, history.heads] if beneath else values
         counts = np.full(len(rows), shown.shape[1])
         scalars = rr.Scalars.columns(scalars=shown.ravel()).partition(counts)
-        stream.send_columns(f"{_path(history, False)}/{key}", times, scalars)
+        stream.send_columns(f"{history_path(history)}/{key}", times, scalars)
         if history.decades:
             powers = np.log10(np.where(shown >= low, shown, np.nan)).astype(np.float32)
             scalars = rr.Scalars.columns(scalars=powers.ravel()).partition(counts)
-            stream.send_columns(f"{_path(history, True)}/{key}", times, scalars)
+            stream.send_columns(f"{history_path(history, power=True)}/{key}", times, scalars)
     return Progress(memories=memories, floors=floors, row=row)
 
 
-def history_views(drawn: Sequence[History], logarithmic: bool) -> list[rrb.TimeSeriesView]:
-    """Returns the views of histories.
+def history_path(history: History, power: bool = False) -> str:
+    """Returns the path of a history, beneath which each flight has its own.
 
     Args:
-        drawn: The histories.
-        logarithmic: Whether of those with a logarithmic axis, or of the others.
+        history: The history.
+        power: Whether of the logarithms of its values.
     """
-    views = []
-    for history in drawn:
-        if bool(history.decades) != logarithmic:
-            continue
-        for scale in (True, False) if logarithmic else (False,):
-            unit = f"log10 {history.unit}" if scale else history.unit
-            views.append(
-                rrb.TimeSeriesView(
-                    origin=_path(history, scale),
-                    name=f"{history.title} [{unit or '-'}]",
-                    plot_legend=rrb.PlotLegend(corner="RightTop"),
-                )
-            )
-    return views
+    return f"law/{history.name}{'_log10' if power else ''}"
 
 
 def globes(stream: Stream, drawn: Sequence[Sphere]) -> None:
@@ -181,7 +168,7 @@ def globes(stream: Stream, drawn: Sequence[Sphere]) -> None:
         ends = 1.25 * np.eye(3)
         axes = rr.LineStrips3D([[end * 0.8, end] for end in ends], colors=NET, radii=-1.0)
         stream.log(f"{path}/axes", axes, static=True)
-        names = rr.Points3D(ends, labels=["x", "y", "z"], colors=NET, radii=-0.1)
+        names = rr.Points3D(ends, labels=["x", "y", "z"], colors=GREY, radii=-0.1)
         stream.log(f"{path}/axes/names", names, static=True)
         for k, arrow in enumerate(chart.arrows):
             target, color = np.array(arrow.target), CURVES[k % len(CURVES)][1]
@@ -207,7 +194,7 @@ def arrow_styles(stream: Stream, drawn: Sequence[Sphere], key: str, beneath: boo
     for chart in drawn:
         for k, arrow in enumerate(chart.arrows):
             color, path = CURVES[k % len(CURVES)][beneath], _flight(chart, arrow, key)
-            look = rr.LineStrips3D.from_fields(colors=color, radii=-3.0 if beneath else -1.4)
+            look = rr.LineStrips3D.from_fields(colors=color, radii=-0.8 if beneath else -2.2)
             stream.log(f"{path}/track", look, static=True)
             shaft = rr.Arrows3D.from_fields(
                 origins=[[0.0, 0.0, 0.0]],
@@ -262,7 +249,7 @@ def sphere_views(drawn: Sequence[Sphere], keys: Sequence[str]) -> list[rrb.Spati
     return [
         rrb.Spatial3DView(
             origin=f"sphere/{chart.name}",
-            name=chart.title + (f"; outlined: {chart.bound}" if chart.bound else ""),
+            name=chart.title,
             background=NIGHT,
             line_grid=rrb.LineGrid3D(visible=False),
             eye_controls=rrb.EyeControls3D(
@@ -299,10 +286,6 @@ def _width(curve: Curve, beneath: bool) -> float:
     if curve.hue is None:
         return WIDE if beneath else 2.4
     return WIDE if curve.beneath else THIN
-
-
-def _path(history: History, logarithmic: bool) -> str:
-    return f"law/{history.name}{'_log10' if logarithmic else ''}"
 
 
 def _flight(chart: Sphere, arrow: Arrow, key: str) -> str:

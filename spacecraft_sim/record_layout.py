@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 
 from spacecraft_sim.chart import Charts, History, Sphere
 from spacecraft_sim.record_chart import NIGHT, Plane, map_views, plane_views
-from spacecraft_sim.record_law import history_views, sphere_views
+from spacecraft_sim.record_law import history_path, sphere_views
 from spacecraft_sim.record_scene import TIMELINE
 from spacecraft_sim.record_signals import band_path
 from spacecraft_sim.signal_groups import Group
@@ -34,6 +34,7 @@ class Layout:
         drawn: Whether anything of it is drawn.
         ends: End of each flight, s, by its name in paths.
         duration: Length of the longest flight, s.
+        active: Until when plots show it first, s; None for all of it.
         groups: What is plotted.
         planes: Phase planes.
         charts: What the law draws.
@@ -52,6 +53,7 @@ class Layout:
     drawn: bool
     ends: Mapping[str, float]
     duration: float
+    active: float | None
     groups: Sequence[Group]
     planes: Sequence[Plane]
     charts: Charts
@@ -106,12 +108,14 @@ def _words() -> rrb.Tabs:
     return rrb.Tabs(documents[0], events, documents[1])
 
 
-def _time(near: float | None) -> rrb.TimeAxis:
-    """The whole flight, or some seconds on both sides of the cursor."""
+def _time(near: float | None = None, until: float | None = None) -> rrb.TimeAxis:
+    """The whole flight, or some seconds on both sides of the cursor, or its beginning."""
     boundary = rr.TimeRangeBoundary
     start, end = boundary.infinite(), boundary.infinite()
     if near:
         start, end = (boundary.cursor_relative(seconds=s * near) for s in (-1, 1))
+    if until:
+        start, end = (boundary.absolute(seconds=s) for s in (0.0, until))
     return rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
 
 
@@ -120,6 +124,7 @@ def _plot(
     name: str,
     *,
     near: float | None = None,
+    until: float | None = None,
     half: float | None = None,
     bounds: Sequence[str] = (),
 ) -> rrb.TimeSeriesView:
@@ -128,7 +133,7 @@ def _plot(
         origin=origin,
         contents=["+ $origin/**", *(f"+ /{path}" for path in bounds)],
         name=name,
-        axis_x=_time(near),
+        axis_x=_time(near, until),
         axis_y=rrb.ScalarAxis(range=(-half, half)) if half else None,
         plot_legend=rrb.PlotLegend(corner="RightTop"),
     )
@@ -141,13 +146,27 @@ def _histories(layout: Layout) -> rrb.Vertical:
     for role in ("position", "rate", "tip"):
         groups = [group for group in layout.groups if group.role == role]
         if groups:
-            rows.append(rrb.Tabs(*(_plot(g.name, f"{g.title} [{g.unit or '-'}]") for g in groups)))
+            rows.append(rrb.Tabs(*_spans([(g.name, g.title, g.unit) for g in groups], layout)))
         kept = [g for g in groups if any(signal in paths for signal in g.signals)]
         if kept:
             rows.append(rrb.Tabs(*(_kept(group, layout.bands, paths) for group in kept)))
-    if views := history_views(layout.histories, logarithmic=False):
-        rows.append(rrb.Tabs(*views))
+    if linear := [h for h in layout.histories if not h.decades]:
+        parts = [(history_path(h), h.title, h.unit) for h in linear]
+        rows.append(rrb.Tabs(*_spans(parts, layout)))
     return rrb.Vertical(*rows)
+
+
+def _spans(parts: Sequence[tuple[str, str, str]], layout: Layout) -> list[rrb.TimeSeriesView]:
+    """Plots of the whole flight; before them, of one that comes to rest, plots of its beginning."""
+    whole = [_plot(origin, f"{title} [{unit or '-'}]") for origin, title, unit in parts]
+    if not layout.active:
+        return whole
+    words = f"first {layout.active:.3g} s"
+    first = [
+        _plot(origin, f"{title} [{unit or '-'}], {words}", until=layout.active)
+        for origin, title, unit in parts
+    ]
+    return [*first, *whole]
 
 
 def _kept(group: Group, bands: Mapping[str, float], paths: Mapping[str, str]) -> rrb.TimeSeriesView:
@@ -162,16 +181,21 @@ def _near_and_planes(layout: Layout, following: bool) -> rrb.Vertical:
     firsts = [v for v, plane in zip(views, layout.planes, strict=True) if plane.word == "whole"]
     others = [v for v, plane in zip(views, layout.planes, strict=True) if plane.word != "whole"]
     spheres = sphere_views(layout.spheres, list(layout.ends))
-    energies = history_views(layout.histories, logarithmic=True)
+    energies = [
+        _plot(history_path(h, power), f"{h.title} [{'log10 ' if power else ''}{h.unit}]")
+        for h in layout.histories
+        if h.decades
+        for power in (True, False)
+    ]
     found = (spheres, energies, [*firsts, *map_views(layout.charts)], others)
     upper = [rrb.Tabs(*views) for views in found if views]
     near = min(NEAR, layout.duration / 10)
     thrust = [
         _plot("thrust", "Thrust near the cursor [N or N m]", near=near),
-        _plot("thrust", "Thrust, whole flight [N or N m]"),
+        *_spans([("thrust", "Thrust", "N or N m")], layout),
     ]
     # Pulses are seen from near, a torque that follows its command from afar.
-    thrust = thrust if layout.relays else thrust[::-1]
+    thrust = thrust if layout.relays else [*thrust[1:], thrust[0]]
     rows: list[rrb.Container | rrb.View] = [*upper, rrb.Tabs(*thrust)]
     if layout.relays:
         lanes = rrb.StateTimelineView(

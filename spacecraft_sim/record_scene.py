@@ -232,10 +232,9 @@ def plumes(
         scale = np.stack([abs(length), abs(length), length], axis=1)
         times = [rr.TimeColumn(TIMELINE, duration=change.time[rows])]
         for path, through in found.get(change.channel.name, ()):
-            poses = {"scale": scale}
-            if through > 0:
-                poses["translation"] = np.outer(length < 0, [0.0, 0.0, -through])
-            stream.send_columns(path, times, rr.Transform3D.columns(**poses))
+            start = np.outer(length < 0, [0.0, 0.0, -through]) if through > 0 else None
+            pose = rr.Transform3D.columns(scale=scale, translation=start)
+            stream.send_columns(path, times, pose)
 
 
 def throttle(thrust: Array, channel: Channel) -> Array:

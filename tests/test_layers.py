@@ -58,6 +58,7 @@ ONLY_IN = {
     "rerun": {
         "record",
         "record_chart",
+        "record_law",
         "record_layout",
         "record_scene",
         "record_signals",
@@ -67,6 +68,7 @@ ONLY_IN = {
         "plots",
         "plots_chart",
         "plots_film",
+        "plots_law",
         "plots_smooth",
         "plots_pair",
         "plots_certificate",
