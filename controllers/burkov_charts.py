@@ -21,7 +21,7 @@ Terms = Callable[[Vector, Vector, Vector], dict[str, float]]  # of readings, w a
 Values = Callable[[float, Sequence[float], Any, Sequence[float]], Sequence[float]]
 _DECADES = 12  # that V is followed down
 _RAYS = 181  # along which the border of a basin is looked for
-_JOINT_RATES = "Joint rates: true (wide) and estimated, K w (thin)"
+_JOINT_RATES = "Joint rates: true (wide), estimated (thin)"
 
 
 class Remembering(Protocol):
@@ -116,7 +116,7 @@ def mechanism_charts(
     measure = AtSamples(law=law, moving=rates, values=values)
     return (
         _energy(law, terms, moving),
-        _estimates("rates", _JOINT_RATES, "rad/s", law.sensors, measure),
+        _estimates("rates", _JOINT_RATES, "rad/s", law.sensors, "K w", measure),
     )
 
 
@@ -142,7 +142,7 @@ def path_charts(law: Remembering, formula: Path, *, replanned: bool) -> Charts:
         measure=AtSamples(law=law, moving=(), values=partial(_distances, formula)),
         decades=6,
     )
-    return away, _estimates("rates", _JOINT_RATES, "rad/s", law.sensors, measure)
+    return away, _estimates("rates", _JOINT_RATES, "rad/s", law.sensors, "by w", measure)
 
 
 def body_charts(
@@ -168,11 +168,12 @@ def body_charts(
         )
         values = partial(_vector_rates, law.filter.cutoffs, i)
         measure = AtSamples(law=law, moving=rates, values=values)
-        title = f"Rate of {name}: true (wide) and estimated, D w (thin)"
-        estimates.append(_estimates(f"{name}_rate", title, "1/s", signals, measure))
+        title = f"Rate of {name}: true (wide), estimated (thin)"
+        estimates.append(_estimates(f"{name}_rate", title, "1/s", signals, "D w", measure))
     sphere = Sphere(
         name="vectors",
-        title="s2, s3 on the unit sphere of the principal axes",
+        title="s2, s3 on the unit sphere",
+        frame="principal axes of the body",
         arrows=tuple(arrows),
         bound="V can be below 2 min(k2, k3)",
     )
@@ -193,7 +194,8 @@ def spin_charts(
     """
     sphere = Sphere(
         name="direction",
-        title="s1 on the unit sphere of the principal axes",
+        title="s1 on the unit sphere",
+        frame="principal axes of the body",
         arrows=(Arrow(name="s1", signals=direction, target=(1.0, 0.0, 0.0)),),
     )
     return (_energy(law, terms, (*direction, *rates)), sphere)
@@ -215,13 +217,13 @@ def _energy(law: SampledLaw, terms: Terms, moving: tuple[str, ...]) -> History:
 
 
 def _estimates(
-    name: str, title: str, unit: str, read: tuple[str, ...], measure: AtSamples
+    name: str, title: str, unit: str, read: tuple[str, ...], formula: str, measure: AtSamples
 ) -> History:
     """Pairs of curves: what a rate is, and what the filter makes of it."""
     curves = []
     for k, reading in enumerate(read):
-        curves.append(Curve(name=f"{_words(reading)}, true", hue=k, beneath=True))
-        curves.append(Curve(name=f"{_words(reading)}, estimated", hue=k))
+        curves.append(Curve(name=f"{_words(reading)}: true", hue=k, beneath=True))
+        curves.append(Curve(name=f"{_words(reading)}: {formula}", hue=k))
     signals = tuple(dict.fromkeys((*measure.law.sensors, *measure.moving)))
     return History(
         name=name, title=title, unit=unit, curves=tuple(curves), signals=signals, measure=measure

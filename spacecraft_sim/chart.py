@@ -188,12 +188,14 @@ class Sphere:
     Attributes:
         name: One word, for files and paths.
         title: What it shows.
+        frame: The frame, in words.
         arrows: The vectors.
         bound: What the outlines of the basins say, in words; empty if there are none.
     """
 
     name: str
     title: str
+    frame: str
     arrows: tuple[Arrow, ...]
     bound: str = ""
 
@@ -291,6 +293,17 @@ def spheres(charts: Sequence[Chart], flight: Trajectory) -> list[Sphere]:
     """
     found = [chart for chart in charts if isinstance(chart, Sphere)]
     return [c for c in found if all(n in flight.signals for a in c.arrows for n in a.signals)]
+
+
+def vectors(charts: Sequence[Chart], flight: Trajectory) -> tuple[str, ...]:
+    """Returns the names of the fixed directions that are shown: those on spheres, or two of three.
+
+    Args:
+        charts: The charts.
+        flight: The flight.
+    """
+    found = tuple(a.name for chart in spheres(charts, flight) for a in chart.arrows)
+    return found or ("s2", "s3")
 
 
 def path_of(arrow: Arrow, flight: Trajectory) -> Array:

@@ -1,4 +1,4 @@
-"""Lines of a plane: what of them is visible, and where their names stand so that none is covered."""
+"""Lines of a plane: what of them is seen, and where their names stand clear of each other."""
 
 from collections.abc import Sequence
 

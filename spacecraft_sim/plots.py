@@ -44,6 +44,7 @@ def summary(
     title: str,
     bands: Mapping[str, float] | None = None,
     histories: Sequence[Callable[[Axes, Flights, bool], None]] | None = None,
+    law: Sequence[Callable[[Axes, Flights], None]] = (),
 ) -> None:
     """Draws what happened on one page of about 1800 x 1200 pixels.
 
@@ -56,12 +57,14 @@ def summary(
         title: One line over the page.
         bands: Half-widths that signals are to keep, by signal, rad; none if left out.
         histories: Four panels in place of those of the quasi-rigid motion.
+        law: Panels that the law asks for, in place of those of the end of the flight.
     """
     channels, bands = channel_units(measured, drawing), bands or {}
     lanes = max(1.0, 0.42 * len(channels))  # inches
     table = ROW * (len(verdicts) + 1)
     heights = [1.9, 2.3, 2.3, table if histories else max(table, 2 * lanes + 0.6)]
-    edges = np.cumsum([1.12, heights[0], 0.55, heights[1], 0.62, heights[2], 0.72, heights[3]])
+    gap = 0.8 if histories else 0.62  # which have keys of their own
+    edges = np.cumsum([1.12, heights[0], 0.55, heights[1], gap, heights[2], 0.72, heights[3]])
     height = edges[-1] + 0.4
     figure = Figure(figsize=(WIDTH, height), dpi=DPI)
     FigureCanvasAgg(figure)  # the figure keeps it
@@ -72,7 +75,12 @@ def summary(
     note = film(strip, drawing, measured)
     figure.text(0.012, 1 - 0.72 / height, note, size=9.5, color=SOFT, va="center")
     _key(figure, 1 - 0.72 / height, [] if histories else moving_axes(measured, "attitude"), bands)
-    for row, zoom in ((rows[1], False), (rows[2], True)):
+    if law:
+        cells = _grid(figure, rows[2], len(law), 0.05, 0.19)
+        for k, draw in enumerate(law):
+            draw(figure.add_subplot(cells[k]), (predicted, measured))
+        _side(figure, rows[2], "THE LAW")
+    for row, zoom in ((rows[1], False), (rows[2], True))[: 1 if law else 2]:
         start = late if zoom else measured.time[0]
         flights = _since(predicted, start), _since(measured, start)
         panels = [figure.add_subplot(cell) for cell in _grid(figure, row, 4, 0.05, 0.19)]
@@ -84,9 +92,7 @@ def summary(
             _angle(panels[1], flights, "attitude", bands, zoom)
             _tips(panels[2], flights, tuple(drawing.booms))
             _phase_plane(panels[3], flights, bands, zoom)
-        words = "END OF THE FLIGHT" if zoom else "WHOLE FLIGHT"
-        style = {"size": 9, "color": SOFT, "weight": "bold", "rotation": 90, "va": "center"}
-        figure.text(0.016, row.mean(), words, ha="center", **style)
+        _side(figure, row, "END OF THE FLIGHT" if zoom else "WHOLE FLIGHT")
     if histories:  # which show the torques
         _table(figure.add_subplot(_grid(figure, rows[3], 1, 0.012, 0.0)[0]), verdicts)
     else:
@@ -101,6 +107,11 @@ def _grid(
 ) -> GridSpec:
     place = {"top": row[0], "bottom": row[1], "left": left, "right": 0.988, "wspace": space}
     return figure.add_gridspec(1, columns, width_ratios=widths, **place)
+
+
+def _side(figure: Figure, row: Array, words: str) -> None:
+    style = {"size": 9, "color": SOFT, "weight": "bold", "rotation": 90, "va": "center"}
+    figure.text(0.016, row.mean(), words, ha="center", **style)
 
 
 def _heading(figure: Figure, title: str, verdicts: Sequence[Verdict], y: float) -> None:

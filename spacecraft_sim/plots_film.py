@@ -7,6 +7,7 @@ from matplotlib.path import Path as Line
 
 from spacecraft_sim import sketch, spans
 from spacecraft_sim.drawing import Drawing, Jet, channel_units, turned
+from spacecraft_sim.families import is_quasi_rigid
 from spacecraft_sim.sketch import View
 from spacecraft_sim.trajectory import Trajectory
 
@@ -15,6 +16,9 @@ Array = np.ndarray
 INK, SOFT, SHADE = "#1d2430", "#6b7484", "#f4f6fa"
 PLUS, MINUS = "#d8432f", "#2b6cd4"
 BOOMS = ("#1f8f4d", "#8a4fd0", "#c98a00", "#178d99", "#d0437a")
+_WAY = 0.98  # share of its way after which a machine is all but at rest
+_FAINT = 0.03  # share of the largest thrust below which no arrow is drawn
+_SMOOTH = 16  # more values than levels of a relay has a thrust that follows a command
 _ARC = np.radians(np.linspace(25, 155, 24))  # of the arrow that stands for a torque
 
 
@@ -29,8 +33,7 @@ def film(strip: list[Axes], drawing: Drawing, measured: Trajectory) -> str:
     Returns:
         What the pictures show, in words.
     """
-    instants = [*np.linspace(drawing.time[0], spans.settled(measured), len(strip) - 1)]
-    frames = [int(np.argmin(np.abs(drawing.time - t))) for t in [*instants, drawing.time[-1]]]
+    frames = _frames(drawing, measured, len(strip))
     view, lines = sketch.view_of(drawing), sketch.boom_lines(drawing)
     lines = {name: (bent[frames], straight[frames]) for name, (bent, straight) in lines.items()}
     factor = sketch.exaggeration(list(lines.values()))
@@ -63,6 +66,19 @@ def film(strip: list[Axes], drawing: Drawing, measured: Trajectory) -> str:
     bending = f"; bending {size}, dashed: unbent" if lines else ""
     arrows = "; arrows: thrust on the craft" if drawing.jets else ""
     return f"{view.words[0].upper()}{view.words[1:]}{bending}{arrows}"
+
+
+def _frames(drawing: Drawing, measured: Trajectory, count: int) -> list[int]:
+    """Until a spacecraft has settled, evenly; of other machines, after equal shares of the way."""
+    if is_quasi_rigid(measured):
+        instants = np.linspace(drawing.time[0], spans.settled(measured), count - 1)
+        found = [int(np.argmin(np.abs(drawing.time - t))) for t in instants]
+    else:
+        steps = [np.linalg.norm(np.diff(q, axis=0), axis=1) for q in drawing.quaternions.values()]
+        way = np.r_[0.0, np.cumsum(np.sum(steps, axis=0))]
+        shares = np.linspace(0, _WAY, count - 1) * way[-1]
+        found = np.searchsorted(way, shares).tolist()
+    return [*found, len(drawing.time) - 1]
 
 
 def _lines(
@@ -104,7 +120,7 @@ def _arrows(
     """Draws the thrust as arrows, an arc for a torque; returns its figures."""
     row = int(np.searchsorted(measured.time, drawing.time[frame], side="right")) - 1
     for jet in drawing.jets:
-        level = np.sign(measured[jet.channel][row])
+        level = _level(measured[jet.channel], row)
         line = _arrow(jet, drawing, frame, view, size * level) if level else None
         if line is not None:
             style = {"color": PLUS if level > 0 else MINUS, "linewidth": 2, "zorder": 99}
@@ -112,7 +128,22 @@ def _arrows(
             axes.add_patch(patch)
     channels = channel_units(measured, drawing)
     on = [f"{measured[c][row]:+.3g} {unit}" for c, unit in channels.items() if measured[c][row]]
+    if len(on) > 2 and all(_smooth(measured[c]) for c in channels):
+        most = max(channels, key=lambda c: abs(measured[c][row]))
+        return f"{most.replace('_', ' ')} {measured[most][row]:+.2g} {channels[most]}"
     return ", ".join(on) if 0 < len(on) < 3 else f"{len(on)} thrusters on" if on else "thrust off"
+
+
+def _smooth(thrust: Array) -> bool:
+    return len(np.unique(thrust)) > _SMOOTH
+
+
+def _level(thrust: Array, row: int) -> float:
+    """Sign of a thrust; times its share of the largest, if it follows its command."""
+    if not _smooth(thrust):
+        return float(np.sign(thrust[row]))
+    share = thrust[row] / np.abs(thrust).max()
+    return float(np.sign(share) * max(abs(share), 0.3)) if abs(share) > _FAINT else 0.0
 
 
 def _arrow(jet: Jet, drawing: Drawing, frame: int, view: View, size: float) -> Array | None:

@@ -15,13 +15,14 @@ _SHOWN = 9  # curves that a panel can carry
 _LEAST = 1e-17  # difference that a logarithmic axis shows as zero
 
 
-def panels(measured: Trajectory) -> tuple[Panel, ...]:
+def panels(measured: Trajectory, vectors: Sequence[str]) -> tuple[Panel, ...]:
     """Returns the four panels that suit a flight: places, rates, torques, and the difference.
 
     Args:
         measured: Flight of the full plant.
+        vectors: Names of the fixed directions that are shown.
     """
-    found = families(measured)
+    found = families(measured, vectors)
     curves = (_curves(title, names, measured) for title, names in found.items())
     return (*curves, _difference(next(iter(found.values())), measured))
 

@@ -23,7 +23,7 @@ from spacecraft_sim import (
 )
 from spacecraft_sim.beneath import Beneath, Subject, channels
 from spacecraft_sim.changes import Channel, changes, rows_to_show
-from spacecraft_sim.chart import histories, spheres
+from spacecraft_sim.chart import histories, spheres, vectors
 from spacecraft_sim.frames import (
     Frames,
     at_rest,
@@ -129,8 +129,8 @@ class Recording:
         middle, radius = record_scene.ball(self._rest, self._poses(known) if upright else ())
         record_scene.ruler(stream, self._rest, middle, radius, upright)
         self._spheres = spheres(subject.charts, known[0])
-        vectors = [a.name for chart in self._spheres for a in chart.arrows] or ("s2", "s3")
-        self._plots = groups(known, list(self._rest.booms), vectors)
+        directions = vectors(subject.charts, known[0])
+        self._plots = groups(known, list(self._rest.booms), directions)
         wide = sorted(subject.bands.items(), key=lambda band: -band[1])
         plotted = {signal for group in self._plots for signal in group.signals}
         self._bands = {signal: half for signal, half in wide if signal in plotted}

@@ -249,7 +249,7 @@ def sphere_views(drawn: Sequence[Sphere], keys: Sequence[str]) -> list[rrb.Spati
     return [
         rrb.Spatial3DView(
             origin=f"sphere/{chart.name}",
-            name=chart.title,
+            name=f"{chart.title}, {chart.frame}",
             background=NIGHT,
             line_grid=rrb.LineGrid3D(visible=False),
             eye_controls=rrb.EyeControls3D(

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from spacecraft_sim import report_charts, report_columns, sketch, spans
-from spacecraft_sim.chart import Charts
+from spacecraft_sim.chart import Charts, Map, Portrait
 from spacecraft_sim.drawing import Drawing, channel_units, turned
 from spacecraft_sim.families import families, is_quasi_rigid
 from spacecraft_sim.guarantee import Verdict
@@ -62,7 +62,7 @@ def page(
     moving = moving_axes(measured, "quasi_rigid_rate")
     axes = [a for a in moving_axes(measured, "quasi_rigid_angle") if a in moving]
     figures += [f for axis in axes for f in _phase_plane(columns, axis, flights, bands)]
-    figures += [f for chart in charts for f in report_charts.figures(columns, chart, measured)]
+    figures += [f for chart in charts if isinstance(chart, (Portrait, Map)) for f in report_charts.figures(columns, chart, measured)]
     start, end = float(measured.time[0]), float(measured.time[-1])
     return {
         "start": start,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spacecraft_sim import config
-from spacecraft_sim.chart import Portrait, charts_of
+from spacecraft_sim.chart import Map, charts_of, vectors
 from spacecraft_sim.compare import Comparison
 from spacecraft_sim.families import is_quasi_rigid
 from spacecraft_sim.guarantee import Assumption, Verdict
@@ -146,7 +146,7 @@ def write_pictures(
         predicted: Flight of the reduced plant.
         comparison: How it came out.
     """
-    from spacecraft_sim import drawing, plots, plots_chart, plots_smooth, report
+    from spacecraft_sim import drawing, plots, plots_chart, plots_law, plots_smooth, report
 
     title, charts = mission.scenario.title, charts_of(mission.controller)
     drawn = drawing.draw(mission.mujoco.model.ptr, mission.machine, measured)
@@ -158,9 +158,12 @@ def write_pictures(
         verdicts=comparison.verdicts,
         title=title,
         bands=mission.bands,
-        histories=None if is_quasi_rigid(predicted) else plots_smooth.panels(measured),
+        histories=None
+        if is_quasi_rigid(predicted)
+        else plots_smooth.panels(measured, vectors(charts, measured)),
+        law=plots_law.panels(charts, measured),
     )
-    if any(not isinstance(chart, Portrait) for chart in charts):
+    if any(isinstance(chart, Map) for chart in charts):
         plots_chart.page(folder / "charts.png", measured=measured, charts=charts, title=title)
     report.write(
         folder / "report.html",
