@@ -76,9 +76,8 @@ def summary(
     figure.text(0.012, 1 - 0.72 / height, note, size=9.5, color=SOFT, va="center")
     _key(figure, 1 - 0.72 / height, [] if histories else moving_axes(measured, "attitude"), bands)
     if law:
-        cells = _grid(figure, rows[2], len(law), 0.05, 0.19)
-        for k, draw in enumerate(law):
-            draw(figure.add_subplot(cells[k]), (predicted, measured))
+        for cell, draw in zip([*_grid(figure, rows[2], len(law), 0.05, 0.19)], law, strict=True):  # pyright: ignore
+            draw(figure.add_subplot(cell), (predicted, measured))
         _side(figure, rows[2], "THE LAW")
     for row, zoom in ((rows[1], False), (rows[2], True))[: 1 if law else 2]:
         start = late if zoom else measured.time[0]

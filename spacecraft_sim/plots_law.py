@@ -77,7 +77,8 @@ def _sphere(chart: Sphere) -> Panel:
 
     def draw(axes: Axes, flights: Flights) -> None:
         view = sphere.view(chart)
-        circle = np.stack([f(np.linspace(0, 2 * np.pi, 181)) for f in (np.cos, np.sin)], axis=1)
+        angle = np.linspace(0, 2 * np.pi, 181)
+        circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         axes.fill(*circle.T, facecolor=SHADE, edgecolor=SOFT, linewidth=0.8, zorder=0)
         for line in sphere.net():
             _curve(axes, view, line, {"color": SOFT, "linewidth": 0.6})
@@ -85,7 +86,7 @@ def _sphere(chart: Sphere) -> Panel:
             place = view.project(1.12 * np.eye(3)[k])
             back = np.eye(3)[k] @ view.near < 0
             style = {"ha": "center", "va": "center", "size": 9, "color": SOFT}
-            axes.text(*place, name, alpha=_BACK if back else 1.0, **style)
+            axes.text(place[0], place[1], name, alpha=_BACK if back else 1.0, **style)
         for k, arrow in enumerate(chart.arrows):
             color, target = BOOMS[k % len(BOOMS)], np.array(arrow.target)
             if arrow.basin is not None:

@@ -202,6 +202,13 @@
     return { found };
   }
 
+  // Powers of ten on an axis of logarithms, some seven at most.
+  function powers(low, high) {
+    const step = Math.max(Math.ceil((high - low) / 7), 1), found = [];
+    for (let k = Math.ceil(low / step) * step; k <= high; k += step) found.push([k, `1e${k}`]);
+    return found;
+  }
+
   function axes(back, inner, [x0, x1], [y0, y1], X, Y, labels) {
     const right = inner.x + inner.width, bottom = inner.y + inner.height;
     const [sx, sy, bx, by] = [labels.sx ?? 1, labels.sy ?? 1, labels.bx ?? 0, labels.by ?? 0];
@@ -318,7 +325,7 @@
   // The other parts of the page register kinds of figures here.
   window.report = {
     page, view, column, rows, rowAt, held, fitted, short, amount, ticks, linePath, stepPath, trackPath,
-    loop, element, frame, key, axes, interact, alongTime, setView, setCursor, figures,
+    loop, element, frame, key, axes, powers, interact, alongTime, setView, setCursor, figures,
     margins: { L, R, T }, cursor: () => cursor, kinds: {},
   };
   let waiting = false;

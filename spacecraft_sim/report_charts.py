@@ -4,12 +4,30 @@ import math
 
 import numpy as np
 
-from spacecraft_sim import report_columns
-from spacecraft_sim.chart import Map, Portrait, half_width, locked, pulses, worst_to_come
+from spacecraft_sim import report_columns, sphere
+from spacecraft_sim.chart import (
+    Chart,
+    History,
+    Map,
+    Portrait,
+    Sphere,
+    floor,
+    half_width,
+    histories,
+    locked,
+    path_of,
+    pulses,
+    series,
+    spheres,
+    worst_to_come,
+)
 from spacecraft_sim.report_columns import Columns, Figure, curve, plane, track
 from spacecraft_sim.trajectory import Trajectory
 
 Array = np.ndarray
+
+ROWS = 3000  # at which histories are computed and paths on spheres kept
+ASPECT = 1.44  # width over height of a plane on the page
 
 
 def _outlines(chart: Portrait | Map) -> Figure:
@@ -35,15 +53,94 @@ def _points(points: Array) -> list[list[float | None]]:
     return [[None, None] if math.isnan(x + y) else [x, y] for x, y in points.tolist()]
 
 
-def figures(columns: Columns, chart: Portrait | Map, measured: Trajectory) -> list[Figure]:
-    """Returns the figures of a chart.
+def figures(columns: Columns, chart: Chart, flights: tuple[Trajectory, Trajectory]) -> list[Figure]:
+    """Returns the figures of a chart; none of one whose signals the flight does not have.
 
     Args:
         columns: Where to pack its numbers.
         chart: The chart.
-        measured: The flight.
+        flights: Of the reduced model and of the full plant.
     """
-    return _portrait(columns, chart, measured) if isinstance(chart, Portrait) else [_map(chart)]
+    measured = flights[1]
+    if isinstance(chart, Portrait):
+        return _portrait(columns, chart, measured)
+    if isinstance(chart, Map):
+        return [_map(chart)]
+    if isinstance(chart, History):
+        return [_history(columns, h, flights) for h in histories([chart], measured)]
+    return [_sphere(columns, s, flights) for s in spheres([chart], measured)]
+
+
+def _history(columns: Columns, history: History, flights: tuple[Trajectory, Trajectory]) -> Figure:
+    """Curves of the full plant, and below them of the reduced one what the history is about."""
+    predicted, measured = flights
+    time, values = series(history, measured, ROWS)
+    low = floor(history, values[0])
+
+    def shown(values: Array) -> Array:
+        return np.log10(np.maximum(values, low)) if history.decades else values
+
+    traces = []
+    if history.heads and all(name in predicted.signals for name in history.signals):
+        below, heads = series(history, predicted, ROWS)
+        for k in history.heads:
+            name = f"{history.curves[k].name}, reduced"
+            look = {"name": name, "tone": "z-reduced", "width": 3.4, "draw": "line"}
+            traces.append({**look, **curve(columns, below, shown(heads[:, k]))})
+    for k, part in enumerate(history.curves):
+        tone = "ink" if part.hue is None else f"boom-{part.hue % 5}"
+        width = 4.0 if part.beneath else 1.4
+        look = {"name": part.name, "tone": tone, "width": width, "faint": part.beneath}
+        data = curve(columns, time, shown(values[:, k]))
+        traces.append({**look, "draw": "line", **data})
+    figure = {"id": f"chart_{history.name}", "kind": "history", "title": history.title}
+    more = {"unit": history.unit, "log": history.decades is not None, "bands": []}
+    return {**figure, **more, "traces": traces}
+
+
+def _sphere(columns: Columns, chart: Sphere, flights: tuple[Trajectory, Trajectory]) -> Figure:
+    """The sphere as it is seen from where the targets are; dashed or thin: its back."""
+    view = sphere.view(chart)
+    angle = np.linspace(0, 2 * np.pi, 121)
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    lines = [{"name": "", "tone": "soft", "width": 1.2, "dashed": False, "points": _points(rim)}]
+    tracks, points = [], []
+
+    def both(points: Array, name: str, tone: str, width: float) -> None:
+        for side, back in zip(sphere.sides(points, view.near), (False, True), strict=True):
+            look = {"name": "" if back else name, "tone": tone, "width": width, "dashed": back}
+            lines.append({**look, "points": _points(view.project(side))})
+
+    for line in sphere.net():
+        both(line, "", "soft", 0.6)
+    for k, arrow in enumerate(chart.arrows):
+        if arrow.basin is not None:
+            both(arrow.basin, f"{arrow.name}: {chart.bound}", f"boom-{k % 5}", 0.9)
+        for flight, plant in zip(flights, ("reduced", "MuJoCo"), strict=True):
+            if not all(name in flight.signals for name in arrow.signals):
+                continue
+            tone, wide = ("z-reduced", 3.4) if plant == "reduced" else (f"boom-{k % 5}", 1.8)
+            rows = np.unique(np.linspace(0, len(flight.time) - 1, ROWS).astype(int))
+            way = path_of(arrow, flight)[rows]
+            for side, share in zip(sphere.sides(way, view.near), (1.0, 0.4), strict=True):
+                x, y = view.project(side).T
+                data = {"x": columns.add(x), "y": columns.add(y)}
+                data["t"] = columns.add(flight.time[rows], "f8")
+                look = {"name": f"{arrow.name}, {plant}", "tone": tone, "width": wide * share}
+                tracks.append({**look, **data, "dotted": plant == "MuJoCo" and share == 1.0})
+        x, y = view.project(np.array(arrow.target)).tolist()
+        points.append({"x": x, "y": y, "name": f"goal of {arrow.name}"})
+    across = {"name": f"{chart.frame}, seen from the goals; thin: at the back", "unit": ""}
+    figure = plane(f"chart_{chart.name}", chart.title, across, {"name": "", "unit": ""})
+    window = [-1.15 * ASPECT, 1.15 * ASPECT, -1.15, 1.15]
+    return {
+        **figure,
+        "lines": lines,
+        "tracks": tracks,
+        "points": points,
+        "window": window,
+        "smooth": False,
+    }
 
 
 def _portrait(columns: Columns, portrait: Portrait, measured: Trajectory) -> list[Figure]:

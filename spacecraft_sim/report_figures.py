@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from spacecraft_sim import report_charts, report_columns, sketch, spans
-from spacecraft_sim.chart import Charts, Map, Portrait
+from spacecraft_sim.chart import Charts, vectors
 from spacecraft_sim.drawing import Drawing, channel_units, turned
 from spacecraft_sim.families import families, is_quasi_rigid
 from spacecraft_sim.guarantee import Verdict
@@ -47,8 +47,9 @@ def page(
     if is_quasi_rigid(flights[0]):
         figures = [_history(columns, kind, flights, drawing, bands) for kind in HISTORIES]
     else:
-        figures = [_family(columns, *part, flights) for part in families(measured).items()]
-        figures.append(_difference(columns, flights))
+        shown = families(measured, vectors(charts, measured))
+        figures = [_family(columns, *part, flights) for part in shown.items()]
+        figures.append(_difference(columns, next(iter(shown.values())), flights))
     figures = [figure for figure in figures if figure["traces"]]
     if figures:
         figures[0]["marks"] = [
@@ -62,7 +63,7 @@ def page(
     moving = moving_axes(measured, "quasi_rigid_rate")
     axes = [a for a in moving_axes(measured, "quasi_rigid_angle") if a in moving]
     figures += [f for axis in axes for f in _phase_plane(columns, axis, flights, bands)]
-    figures += [f for chart in charts if isinstance(chart, (Portrait, Map)) for f in report_charts.figures(columns, chart, measured)]
+    figures += [f for chart in charts for f in report_charts.figures(columns, chart, flights)]
     start, end = float(measured.time[0]), float(measured.time[-1])
     return {
         "start": start,
@@ -116,9 +117,8 @@ def _family(columns: Columns, title: str, names: Sequence[str], flights: Flights
     return {**figure, "unit": unit, "traces": traces, "bands": []}
 
 
-def _difference(columns: Columns, flights: Flights) -> Figure:
+def _difference(columns: Columns, names: Sequence[str], flights: Flights) -> Figure:
     """MuJoCo minus the reduced plant, where both have rows."""
-    names = next(iter(families(flights[1]).values()))
     time, i, j = np.intersect1d(flights[0].time, flights[1].time, return_indices=True)
     traces = []
     for k, name in enumerate(n for n in names if n in flights[0].signals):

@@ -2,7 +2,7 @@
 "use strict";
 (() => {
   const { page, view, column, rows, held, fitted, short, amount, linePath, stepPath, trackPath, loop,
-    element, frame, key, axes, interact, alongTime, setView, setCursor, margins, cursor,
+    element, frame, key, axes, powers, interact, alongTime, setView, setCursor, margins, cursor,
   } = window.report;
   const { L, T } = margins;
   const kinds = window.report.kinds;
@@ -34,6 +34,7 @@
       const path = element("path", { class: "trace", "data-name": trace.name,
         style: `--c: var(--${trace.tone})`, "stroke-width": trace.width }, shape.inside);
       if (trace.dashed) path.setAttribute("stroke-dasharray", "5 4");
+      if (trace.faint) path.setAttribute("stroke-opacity", 0.35);
       return { ...trace, ...look, value, path, t: column(trace.t), v: column(trace.y) };
     });
     for (const band of spec.bands) {
@@ -78,8 +79,9 @@
       [X, inverse] = timeAxis(inner);
       const [y0, y1] = reach();
       const Y = (v) => T + inner.height * (1 - (v - y0) / (y1 - y0));
-      const [sy, unit, by] = fitted(spec.unit, y0, y1);
-      axes(shape.back, inner, [view.from, view.to], [y0, y1], X, Y, { y: unit, sy, by });
+      const [sy, unit, by] = spec.log ? [1, spec.unit, 0] : fitted(spec.unit, y0, y1);
+      axes(shape.back, inner, [view.from, view.to], [y0, y1], X, Y,
+        { y: unit, sy, by, yticks: spec.log ? powers(y0, y1) : undefined });
       for (const { low, high, faint } of spec.bands) {
         const [a, b] = [Y(high), Y(low)].map((y) => Math.min(Math.max(y, T - 2), T + inner.height + 2));
         const place = { x: L, y: a, width: inner.width, height: Math.max(b - a, 1) };
@@ -101,7 +103,9 @@
         }
         path.setAttribute("d", d);
         const now = cursor();
-        value.textContent = now === null || how === "stem" ? "" : amount(v[held(t, now)], spec.unit);
+        const read = v[held(t, now ?? 0)];
+        value.textContent = now === null || how === "stem" ? ""
+          : amount(spec.log ? 10 ** read : read, spec.unit);
         if (d && now !== null && how !== "stem" && now >= view.from && now <= view.to) {
           const k = held(t, now);
           element("circle", { class: "dot", r: 3, style: `--c: var(--${tone})`,
