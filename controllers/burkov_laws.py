@@ -4,6 +4,7 @@ Each turns readings and filtered rates w into torques, in continuous time.  None
 and not (5.8) reads a velocity.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -120,6 +121,19 @@ class BodyVectors:
     k: tuple[float, float]
     G: tuple[Numbers, Numbers]
 
+    @property
+    def stiffness(self) -> float:
+        """Least stiffness at the goal: k2 + k3, k3, k2 about r1, r2, r3, N m/rad."""
+        return min(self.k)
+
+    def angle(self, y: Sequence[float]) -> float:
+        """Returns the angle that the body is turned from the goal, rad.
+
+        Args:
+            y: s2 and s3, in principal axes, before whatever else is read.
+        """
+        return _angle(self.r, y)
+
     def filtered(self, t: float, y: Sequence[float]) -> Sequence[float]:
         """Returns s2 and s3.
 
@@ -157,6 +171,19 @@ class BodyVectorsAndRates:
     r: tuple[Numbers, Numbers]
     k: tuple[float, float]
     G: Numbers
+
+    @property
+    def stiffness(self) -> float:
+        """Least stiffness at the goal: k2 + k3, k3, k2 about r1, r2, r3, N m/rad."""
+        return min(self.k)
+
+    def angle(self, y: Sequence[float]) -> float:
+        """Returns the angle that the body is turned from the goal, rad.
+
+        Args:
+            y: s2 and s3, in principal axes, before whatever else is read.
+        """
+        return _angle(self.r, y)
 
     def filtered(self, t: float, y: Sequence[float]) -> tuple[float, ...]:
         """Returns nothing: the rates are measured.
@@ -228,6 +255,17 @@ def _attraction(
     """k2 r2 x s2 + k3 r3 x s3."""
     first, second = _cross(r[0], s[:3]), _cross(r[1], s[3:6])
     return [k[0] * a + k[1] * b for a, b in zip(first, second, strict=True)]
+
+
+def _angle(r: tuple[Numbers, Numbers], s: Sequence[float]) -> float:
+    """Angle of the rotation that takes s2, s3 to r2, r3, from its sine and cosine."""
+    goal = (_cross(r[0], r[1]), *r)
+    seen = (_cross(s[:3], s[3:6]), s[:3], s[3:6])
+    sine, cosine = [0.0] * 3, -1.0
+    for a, b in zip(goal, seen, strict=True):
+        sine = _sum(sine, _cross(b, a))
+        cosine += sum(x * y for x, y in zip(a, b, strict=True))
+    return math.atan2(math.hypot(*sine), cosine)
 
 
 def _cross(a: Sequence[float], b: Sequence[float]) -> list[float]:

@@ -1,94 +1,54 @@
 """PD feedback through a pulse-width pulse-frequency modulator, for comparison.
 
-Law.  r = -(k_p x + k_d v) drives a lag, T f' = K (r - u) - f, and f a Schmitt trigger, whose output
-is the thrust u.  Sampled: the lag is carried exactly from sample to sample with its input held.
+Law.  u = -(k_p x + k_d v), sampled, through the modulator of `modulation.py`.
 
 G. Song, N. V. Buck, B. N. Agrawal, "Spacecraft vibration reduction using pulse-width
 pulse-frequency modulated input shaper", J. Guidance, Control, and Dynamics 22 (1999) 433-440.
 Nothing is guaranteed.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
-from controllers.axis import SIGNS, Axis, Ways, channel
+from controllers.axis import Axis, Ways, channel
+from controllers.modulation import Modulated, Pwpf
+from controllers.velocity_filter import sampled
 from spacecraft_sim.checks import positive
 from spacecraft_sim.guarantee import Guarantee
 from spacecraft_sim.reduced import ReducedModel
 from spacecraft_sim.thrusters import Thrusters
 
 
-class Memory(NamedTuple):
-    """Output of the lag and sign of the thrust."""
-
-    lag: float
-    sign: int
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Modulator:
-    """The law; all signals are in units of the thrust.
+class ProportionalDerivative:
+    """u = -(k_p x + k_d v).
 
     Attributes:
-        proportional: k_p over the thrust, 1/rad.
-        derivative: k_d over the thrust, s/rad.
-        gain: K.
-        decay: exp(-period/T).
-        on: |f| at which the thruster switches on.
-        off: |f| at which it switches off.
-        level: Thrust, N or N m.
-        signs: Signs that the thrust may have.
-        period: Sampling period, s.
-        sensors: Angle and rate.
-        thrusters: The channel.
+        proportional: k_p, N/rad or N m/rad.
+        derivative: k_d, N s/rad or N m s/rad.
     """
 
     proportional: float
     derivative: float
-    gain: float
-    decay: float
-    on: float
-    off: float
-    level: float
-    signs: tuple[int, ...]
-    period: float
-    sensors: tuple[str, ...]
-    thrusters: tuple[str, ...]
 
-    def init(self) -> Memory:
-        """Returns a lag at rest and the thruster off."""
-        return Memory(0.0, 0)
+    def filtered(self, t: float, y: Sequence[float]) -> tuple[float, ...]:
+        """Returns nothing: the rate is measured.
 
-    def step(self, t: float, y: Sequence[float], memory: Memory) -> tuple[tuple[float], Memory]:
-        """Returns the thrust and the new memory.
+        Args:
+            t: Time, s.
+            y: Readings.
+        """
+        return ()
+
+    def command(self, t: float, y: Sequence[float], w: Sequence[float]) -> tuple[float]:
+        """Returns the thrust, N or N m.
 
         Args:
             t: Time, s.
             y: Angle and rate, rad and rad/s.
-            memory: What the last step returned.
+            w: Nothing.
         """
-        wanted = -(self.proportional * y[0] + self.derivative * y[1])
-        goal = self.gain * (wanted - memory.sign)
-        lag = goal + (memory.lag - goal) * self.decay
-        sign = memory.sign
-        if sign and sign * lag <= self.off:
-            sign = 0
-        for way in self.signs:
-            if way * lag >= self.on:
-                sign = way
-        return (sign * self.level,), Memory(lag, sign)
-
-    def events(self, t: float, y: Sequence[float], memory: Memory) -> tuple[float, ...]:
-        """Returns nothing: the law acts at its samples.
-
-        Args:
-            t: Time, s.
-            y: Angle and rate.
-            memory: What the last step returned.
-        """
-        return ()
+        return (-(self.proportional * y[0] + self.derivative * y[1]),)
 
 
 def design(
@@ -104,7 +64,7 @@ def design(
     period: float = 0.02,
     ways: Ways = "both",
     axis: Axis = "z",
-) -> tuple[Modulator, tuple[Guarantee, ...]]:
+) -> tuple[Modulated, tuple[Guarantee, ...]]:
     """Designs PD feedback through a PWPF modulator; nothing is guaranteed of it.
 
     Args:
@@ -112,8 +72,8 @@ def design(
         thrusters: The thrusters; ideal if left out.
         bandwidth: Natural frequency of the PD loop, rad/s.
         damping_ratio: Its damping ratio.
-        gain: K of the lag.
-        time_constant: T of the lag, s.
+        gain: K_m of the lag.
+        time_constant: T_m of the lag, s.
         on: Output of the lag, over the thrust, at which the thruster switches on.
         off: Output at which it switches off.
         period: Sampling period, s.
@@ -126,24 +86,28 @@ def design(
     Raises:
         ValueError: If a number is not positive, or `off` not below `on`.
     """
-    positive(bandwidth=bandwidth, damping_ratio=damping_ratio, gain=gain, on=on, off=off)
-    positive(time_constant=time_constant, period=period)
-    if off >= on:
-        raise ValueError(f"off = {off} must be below on = {on}: the trigger would chatter")
+    positive(bandwidth=bandwidth, damping_ratio=damping_ratio)
+    modulation = Pwpf(
+        kind="pwpf", gain=gain, time_constant=time_constant, on=on, off=off, ways=ways
+    )
     found = channel(model, thrusters, axis=axis)
-    level = found.spec.levels[-1] if found.spec else 1.0
-    thrust = level * found.unit  # rad/s^2
-    law = Modulator(
-        proportional=bandwidth**2 / thrust,
-        derivative=2 * damping_ratio * bandwidth / thrust,
-        gain=gain,
-        decay=math.exp(-period / time_constant),
-        on=on,
-        off=off,
-        level=level,
-        signs=SIGNS[ways],
+    least = found.spec.min_on_time if found.spec else 0.0
+    law = sampled(
+        ProportionalDerivative(
+            proportional=bandwidth**2 / found.unit,
+            derivative=2 * damping_ratio * bandwidth / found.unit,
+        ),
+        cutoffs=(),
+        hold="first-order hold",
         period=period,
         sensors=found.sensors,
-        thrusters=(found.thruster,),
+        channels=(found.thruster,),
+        thrusters=thrusters,
     )
-    return law, ()
+    pulsed = Modulated(
+        law=law,
+        sampling=period,
+        modulators=(modulation.modulator(period, least),),
+        levels=(found.spec.levels[-1] if found.spec else 1.0,),
+    )
+    return pulsed, ()

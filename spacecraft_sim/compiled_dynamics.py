@@ -18,6 +18,7 @@ from spacecraft_sim.checks import choices
 from spacecraft_sim.readings import Readings
 
 Array = np.ndarray
+RATES = ("rate_x", "rate_y", "rate_z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,6 +124,38 @@ def dynamics_at(physics: Any, channels: tuple[str, ...]) -> CompiledDynamics:
     return CompiledDynamics(
         model=model, qpos=data.qpos.copy(), qvel=data.qvel.copy(), wiring=wiring
     )
+
+
+def inertias(physics: Any, channels: tuple[str, ...]) -> tuple[float, ...]:
+    """Returns the moment of inertia that each torque meets at once, kg m^2.
+
+    That is torque over the acceleration of the bus, |rate_x', rate_y', rate_z'|: elastic parts
+    follow only later.
+
+    Args:
+        physics: A MuJoCo plant.
+        channels: Inputs, each a torque on the bus.
+
+    Raises:
+        ValueError: If the plant has no such input, or its bus has no rates.
+    """
+    motion = dynamics_at(physics, channels)
+    names = list(motion.units)
+    for rate in RATES:
+        if rate not in names:
+            raise ValueError(choices("reading", rate, names, where="the plant"))
+    rows, n = [names.index(rate) for rate in RATES], motion.model.nv
+
+    def pace(qacc: Array) -> Array:  # readings of rates, linear in the velocities
+        return motion.readings(np.r_[np.zeros(n), qacc])[rows]
+
+    rest = np.zeros(2 * n)
+    idle = motion.rates(rest, np.zeros(len(channels)))[n:]
+    found = []
+    for e in np.eye(len(channels)):
+        push = motion.rates(rest, e)[n:] - idle
+        found.append(1 / float(np.linalg.norm(pace(push) - pace(np.zeros(n)))))
+    return tuple(found)
 
 
 def basis(model: Any, *, without: tuple[int, ...] = ()) -> Array:

@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 
 from spacecraft_sim.config import unit_of
 from spacecraft_sim.guarantee import Guarantee
-from spacecraft_sim.mission import parameters_of
+from spacecraft_sim.mission import asked_for, parameters_of
 from spacecraft_sim.scenario import Scenario
 from spacecraft_sim.spacecraft import Spacecraft
 
@@ -29,10 +29,13 @@ def parameters(
         machine: Its spacecraft.
         design: The design function of its law.
     """
+    law = list(_law(design, scenario.controller))
+    if modulation := asked_for(scenario.controller):
+        law += _fields(modulation, "controller.modulation.")
     return [
         ("scenario", list(_fields(scenario, ""))),
         (f"spacecraft {machine.name}", list(_fields(machine, ""))),
-        (f"law {scenario.controller['law']}", list(_law(design, scenario.controller))),
+        (f"law {scenario.controller['law']}", law),
     ]
 
 

@@ -14,10 +14,12 @@ from typing import Any, get_args
 from pydantic import TypeAdapter, create_model
 
 import controllers
-from controllers import REGISTRY, Design
+from controllers import REGISTRY, Design, modulation_claims
 from controllers.burkov_energy import Body
+from controllers.modulation import Modulation, asked_for, modulated
 from spacecraft_sim import (
     beam,
+    compiled_dynamics,
     compiled_mechanism,
     config,
     conservation,
@@ -226,6 +228,10 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
         law, guarantees = design(
             _known_model(design, plant, known.model.ptr), thrusters, **parameters
         )
+        if modulation := asked_for(scenario.controller):
+            law = modulated(law, modulation, thrusters)
+            met = partial(compiled_dynamics.inertias, known, law.thrusters)
+            guarantees = modulation_claims.claims(law, met)
     except ValueError as error:
         raise ValueError(f"{scenario.name}, law {name}: {error}") from error
     if isinstance(plant, reduced.ReducedPhysics):
@@ -282,7 +288,7 @@ def _parameters(design: Design, table: Mapping[str, Any]) -> dict[str, Any]:
         if is_dataclass(known[key].annotation)
         else value
         for key, value in table.items()
-        if key != "law"
+        if key not in ("law", "modulation")
     }
 
 
@@ -382,5 +388,6 @@ def _controller_faults(table: Any, laws: Mapping[str, Design]) -> list[str]:
         )
         for name, p in parameters_of(laws[law]).items()
     }
-    model = create_model("controller", __base__=config.Model, law=(str, ...), **fields)
+    fields |= {"law": (str, ...), "modulation": (Modulation, None)}
+    model = create_model("controller", __base__=config.Model, **fields)
     return config.faults(model, table, prefix="controller.")

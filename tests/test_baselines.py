@@ -70,13 +70,13 @@ def test_pwpf_brings_the_spacecraft_into_its_dead_zone(angle):
     track = fly(law, angle=angle)
     late = track.time > 40
     # At rest the modulator stays silent while K k_p |x| < on.
-    assert np.abs(track["attitude_z"][late]).max() < 0.45 / 4.5 / law.proportional
+    assert np.abs(track["attitude_z"][late]).max() < 0.45 / 4.5 / 0.4**2
     assert pulses(track.time, track["thruster_z"])[1].min() >= LEAST * (1 - 1e-9)
 
 
 def test_pwpf_in_its_linear_range_gives_the_pd_torque_on_average():
     law, _ = pwpf.design(bandwidth=0.4, on=0.45, off=0.15, time_constant=0.15, period=0.001)
-    memory, spent, y = law.init(), 0.0, (-0.5 / law.proportional, 0.0)  # asks for half the thrust
+    memory, spent, y = law.init(), 0.0, (-0.5 / 0.4**2, 0.0)  # asks for half the thrust
     for k in range(20_000):
         (u,), memory = law.step(k * 1e-3, y, memory)
         spent += u * 1e-3
@@ -86,8 +86,9 @@ def test_pwpf_in_its_linear_range_gives_the_pd_torque_on_average():
 
 def test_lag_of_the_modulator_is_carried_exactly():
     law, _ = pwpf.design(bandwidth=0.4, time_constant=0.3, period=0.06, on=2.0, gain=1.0)
-    _, memory = law.step(0.0, (-1.0 / law.proportional, 0.0), law.init())
-    assert memory.lag == pytest.approx(1 - math.exp(-0.2), rel=1e-14)
+    _, memory = law.step(0.0, (-1.0 / 0.4**2, 0.0), law.init())
+    (channel,) = memory.channels
+    assert channel.lag == pytest.approx(1 - math.exp(-0.2), rel=1e-14)
 
 
 @pytest.mark.parametrize(
