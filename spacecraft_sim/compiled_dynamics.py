@@ -78,14 +78,9 @@ class CompiledDynamics:
         mujoco.mj_forward(self.model, self._data)
         n = self.model.nv
         drift = x[n:].copy()
-        for j in range(self.model.njnt):
-            kind = mujoco.mjtJoint(self.model.jnt_type[j])
-            if kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
-                first = int(self.model.jnt_dofadr[j])
-                first += 3 if kind == mujoco.mjtJoint.mjJNT_FREE else 0
-                turn = slice(first, first + 3)
-                # Seen from a reference that turns, a turn x of the body turns the other way.
-                drift[turn] += np.cross(x[turn], self.qvel[turn])
+        for turn in _turns(self.model):
+            # Seen from a reference that turns, a turn x of the body turns the other way.
+            drift[turn] += np.cross(x[turn], self.qvel[turn])
         return np.concatenate([drift, self._data.qacc])
 
     def readings(self, x: Array) -> Array:
@@ -103,6 +98,31 @@ class CompiledDynamics:
         self._data.qpos[:] = self.qpos
         mujoco.mj_integratePos(self.model, self._data.qpos, np.ascontiguousarray(x[:n]), 1.0)
         self._data.qvel[:] = self.qvel + x[n:]
+
+
+def steady_spin(motion: CompiledDynamics, *, least: float = 1e-3) -> Array:
+    """Returns the velocities of a machine without what is left of a swing; a spin stays.
+
+    Args:
+        motion: The machine, about a motion that has all but settled.
+        least: Rate below which a turn of a free body is taken for the rest of a swing, rad/s.
+    """
+    qvel = np.zeros_like(motion.qvel)
+    for turn in _turns(motion.model):  # a hinge swings, it does not spin
+        rate = motion.qvel[turn]
+        qvel[turn] = np.where(np.abs(rate) < least, 0.0, rate)
+    return qvel
+
+
+def _turns(model: Any) -> list[slice]:
+    """Where the rotations of free and ball joints are among the velocities."""
+    found = []
+    for j in range(model.njnt):
+        kind = mujoco.mjtJoint(model.jnt_type[j])
+        if kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
+            first = int(model.jnt_dofadr[j]) + 3 * (kind == mujoco.mjtJoint.mjJNT_FREE)
+            found.append(slice(first, first + 3))
+    return found
 
 
 def dynamics_at(physics: Any, channels: tuple[str, ...]) -> CompiledDynamics:

@@ -7,7 +7,7 @@ beside them stands what the same machine shows in flights from a small disturban
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,12 +19,12 @@ Array = np.ndarray
 HOLDS = ("zero-order hold", "euler", "first-order hold", "tustin")
 _UPPER = 3.0  # longest sampling period looked at, s
 _FINE = 20  # samples in a delay, where continuous time is meant
-_KICK = 1e-6  # disturbance of each velocity, rad/s
+_KICK = 1e-6  # largest disturbance of an angle, rad, or a rate, rad/s
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05)  # of the largest torque, to which it is limited
-# A slower motion that decays may hide one that grows: flights last so many of its time constants.
-_CONSTANTS, _LONGEST = 14, 150.0  # the latter in s
 _NEWTON = 3  # rounds: from 1e-3 of the scale to rounding
 _CYCLES = 30  # of the critical oscillation in a flight
+_SEEN = 1e-6  # share of a motion in the readings, below which the law does not see it
+_SLOW = 0.02  # turn between samples below which a motion is taken for one without oscillation, rad
 _BRACKET, _ROUNDS = 0.15, 7  # about the linear figure, where MuJoCo's is looked for
 
 
@@ -50,16 +50,16 @@ class Settled:
     Attributes:
         physics: The MuJoCo plant.
         law: The law, one with a formula and a filter.
-        qpos: Configuration.
-        qvel: Velocities.
+        motion: The machine as a function about where it has settled.
+        basis: The states that the loop speaks of, shape (2 nv, n).
         torques: What holds the machine there, by channel of the law, N m.
         loop: The loop linearised there.
     """
 
     physics: Any
     law: Any
-    qpos: Array
-    qvel: Array
+    motion: compiled_dynamics.CompiledDynamics
+    basis: Array
     torques: Array
     loop: Loop
 
@@ -87,7 +87,7 @@ def settle(mission: Any) -> Settled:
             "constant: controller.programme.amplitude=[0.0, ..]"
         )
     dynamics = compiled_dynamics.dynamics_at(physics, law.thrusters)
-    dynamics = replace(dynamics, qvel=_steady(physics))
+    dynamics = replace(dynamics, qvel=compiled_dynamics.steady_spin(dynamics))
     N = compiled_dynamics.basis(dynamics.model, without=_unseen(physics, law))
     dynamics, torques = _rest(dynamics, law, N, t)
     try:
@@ -100,8 +100,8 @@ def settle(mission: Any) -> Settled:
     return Settled(
         physics=physics,
         law=law,
-        qpos=dynamics.qpos,
-        qvel=dynamics.qvel,
+        motion=dynamics,
+        basis=N,
         torques=torques,
         loop=close(law, plant, t=t),
     )
@@ -136,12 +136,12 @@ def margins(settled: Settled, *, flown: bool = True) -> tuple[Margin, ...]:
     Raises:
         ValueError: If the loop is not stable without delay.
     """
-    delay, frequency = delay_margin(settled.loop)
+    delay, _ = delay_margin(settled.loop)
     found = [Margin(name="delay", linear=delay, flown=math.nan)]
     if flown and math.isfinite(delay):
         found[0] = replace(
             found[0],
-            flown=_flown(lambda x: _growth(settled, x / _FINE, _rest_of(x), frequency), delay),
+            flown=_flown(lambda x: _growth(settled, x / _FINE, late=_FINE), delay),
         )
     holds = HOLDS if settled.law.filter.cutoffs else ("held torque",)
     for hold in holds:
@@ -149,7 +149,7 @@ def margins(settled: Settled, *, flown: bool = True) -> tuple[Margin, ...]:
         period = longest_period(replace(settled.loop, filter=filter_), upper=_UPPER)
         measured = math.nan
         if flown and math.isfinite(period) and hold in (settled.law.filter.hold, "held torque"):
-            measured = _flown(lambda x: _growth(settled, x, 0.0, frequency), period)
+            measured = _flown(lambda x: _growth(settled, x), period)
         found.append(Margin(name=f"sampling period, {hold}", linear=period, flown=measured))
     return tuple(found)
 
@@ -206,33 +206,35 @@ def _flown(growth: Callable[[float], float], linear: float) -> float:
     return (low + high) / 2
 
 
-def _growth(settled: Settled, period: float, delay: float, frequency: float) -> float:
-    """Rate at which a small disturbance grows, fitted over the second half of a flight, 1/s."""
+def _growth(settled: Settled, period: float, *, late: int = 0) -> float:
+    """Rate at which the least stable motion of the sampled loop grows in a flight, 1/s.
+
+    The flight begins with that motion, by the linear loop, so that no other one which decays more
+    slowly hides what it does; it is fitted over the second half.
+    """
+    start = _least_stable(settled, period, late)
+    steps = math.ceil(_CYCLES * max(start.cycle, 4 * period) / period)
     physics, law = settled.physics, settled.law
-    cycle = 2 * math.pi / frequency if math.isfinite(frequency) else 50 * period
-    slowest = -max(x.real for x in settled.loop.eigenvalues().tolist())
-    duration = max(_CYCLES * max(cycle, 4 * period), min(_CONSTANTS / slowest, _LONGEST))
-    steps = math.ceil(duration / period)
-    decay, gain = law.filter.coefficients(period)
-    filter_ = replace(law.filter, period=period, decay=decay, gain=gain)
     with physics.reset_context():
         pass
     data = physics.data.ptr
-    data.qpos[:], data.qvel[:] = settled.qpos, settled.qvel + _KICK
+    data.qpos[:], data.qvel[:] = start.motion.qpos, start.motion.qvel
     physics.after_reset()
     read = physics.select(law.sensors)
     places = [physics.inputs.index(name) for name in law.thrusters]
     value = np.zeros(len(physics.inputs))
-    value[places] = settled.torques
-    still, target = [0.0] * len(physics.inputs), None
-    memory, waiting, deviation = None, [], np.zeros(steps)
-    target = _target(settled)
+    still, target = [0.0] * len(physics.inputs), _readings(settled, settled.motion)
+    filter_, memory = start.filter, start.memory
+    # A held torque is late by half a period: with that, those under way are late by `late` periods.
+    waiting = [((k - 0.5) * period, torque.tolist()) for k, torque in enumerate(start.under_way)]
+    deviation = np.zeros(steps)
     for k in range(steps):
         t, end = k * period, (k + 1) * period
         y = read()
         deviation[k] = math.dist(y, target)
         memory = filter_.step(law.formula.filtered(t, y), memory)
-        waiting.append((t + delay, law.formula.command(t, y, memory.w)))
+        at = t + (late - 0.5) * period if late else t
+        waiting.append((at, law.formula.command(t, y, memory.w)))
         while waiting and waiting[0][0] < end - 1e-12:
             at, torque = waiting.pop(0)
             if at > t:
@@ -244,7 +246,7 @@ def _growth(settled: Settled, period: float, delay: float, frequency: float) -> 
         physics.advance(end)
         if not deviation[k] < 1.0:
             return math.inf
-    window = max(1, round(cycle / period))
+    window = max(1, round(start.cycle / period))
     half = deviation[steps // 2 :]
     peaks = np.array([half[k : k + window].max() for k in range(0, len(half) - window, window)])
     if len(peaks) < 3 or not np.all(peaks > 0):
@@ -252,28 +254,49 @@ def _growth(settled: Settled, period: float, delay: float, frequency: float) -> 
     return float(np.polyfit(np.arange(len(peaks)) * window * period, np.log(peaks), 1)[0])
 
 
-def _rest_of(delay: float) -> float:
-    """A delay without that of the hold, which is half a sampling period."""
-    return delay * (1 - 0.5 / _FINE)
+class _Start(NamedTuple):
+    """A flight that begins with one motion of the sampled loop: machine, filter, torques."""
+
+    motion: compiled_dynamics.CompiledDynamics
+    filter: Any
+    memory: Any
+    under_way: Array
+    cycle: float
 
 
-def _target(settled: Settled) -> list[float]:
-    """Readings of the law where it has settled."""
-    physics = settled.physics
-    dynamics = compiled_dynamics.CompiledDynamics(
-        model=physics.model.ptr, qpos=settled.qpos, qvel=settled.qvel, wiring={}
+def _least_stable(settled: Settled, period: float, late: int) -> _Start:
+    law, loop = settled.law, settled.loop
+    roots, vectors = np.linalg.eig(loop.sampled_matrix(period, late=late))
+    n, nz = len(loop.A), len(loop.filter.cutoffs)
+    # Parts that swing against each other may do so unseen: no torque speeds them up.
+    seen = np.max(np.abs(loop.C @ vectors[:n]), axis=0)
+    seen = seen > _SEEN * np.max(np.abs(vectors[:n]), axis=0)
+    least = int(np.argmax(np.where(seen, np.abs(roots), 0.0)))
+    state = np.real(vectors[:, least])
+    state *= _KICK / np.max(np.abs(state[:n]))
+    decay, gain = law.filter.coefficients(period)
+    filter_ = replace(law.filter, period=period, decay=decay, gain=gain)
+    motion = settled.motion.moved(settled.basis @ state[:n])
+    z = np.array(law.formula.filtered(0.0, _readings(settled, motion)))
+    # In the loop w = v + b z, where z counts from rest.  A sample before, z was such that the
+    # filter comes to this w from this w: w = a w + b (z - z before).
+    w = state[n : n + nz] + np.array(gain) * (loop.filtered @ loop.C @ state[:n])
+    before = z - (1 - np.array(decay)) * w / np.array(gain)
+    memory = filter_.step(before.tolist(), None)._replace(w=tuple(w.tolist()))
+    return _Start(
+        motion=motion,
+        filter=filter_,
+        memory=memory,
+        under_way=settled.torques + state[n + nz :].reshape(late, len(settled.torques)),
+        cycle=2 * math.pi * period / max(abs(np.angle(roots[least])), _SLOW),
     )
-    readings = dict(
-        zip(dynamics.units, dynamics.readings(np.zeros(2 * len(settled.qvel))), strict=True)
-    )
-    return [float(readings[name]) for name in settled.law.sensors]
 
 
-def _steady(physics: Any) -> Array:
-    """Velocities, without what is left of a swing; a spin stays."""
-    qvel = physics.data.ptr.qvel.copy()
-    qvel[np.abs(qvel) < 1e-3] = 0.0
-    return qvel
+def _readings(settled: Settled, motion: compiled_dynamics.CompiledDynamics) -> list[float]:
+    """Readings of the law at the reference of a motion."""
+    values = motion.readings(np.zeros(2 * motion.model.nv))
+    readings = dict(zip(motion.units, values.tolist(), strict=True))
+    return [readings[name] for name in settled.law.sensors]
 
 
 def _unseen(physics: Any, law: Any) -> tuple[int, ...]:
