@@ -295,9 +295,13 @@ class Pwpf(Model):
         Args:
             period: Sampling period of the law, s.
             min_on_time: Of the thruster, s.
+
+        Raises:
+            ValueError: If the least pulse carries the lag from U_on to -U_on: one pulse would bring
+                on the opposite one, for ever.
         """
         positive(period=period)
-        return PulseWidthPulseFrequency(
+        modulator = PulseWidthPulseFrequency(
             period=period,
             min_on_time=min_on_time,
             gain=self.gain,
@@ -306,6 +310,16 @@ class Pwpf(Model):
             off=self.off,
             signs=SIGNS[self.ways],
         )
+        # In the dead band a pulse carries f from U_on towards U_on - K_m.
+        K, on = self.gain, self.on
+        longest = self.time_constant * math.log(K / (K - 2 * on)) if 2 * on < K else math.inf
+        if modulator.shortest >= longest:
+            raise ValueError(
+                f"a pulse lasts {modulator.shortest:.6g} s at least; from {longest:.6g} s on it "
+                "takes the lag from on to -on, and pulses of both signs would follow each other "
+                "for ever: set modulation.gain lower, modulation.on or .time_constant higher"
+            )
+        return modulator
 
 
 Modulation = Annotated[Pwm | Pwpf, Field(discriminator="kind")]

@@ -91,7 +91,6 @@ def design(
         kind="pwpf", gain=gain, time_constant=time_constant, on=on, off=off, ways=ways
     )
     found = channel(model, thrusters, axis=axis)
-    least = found.spec.min_on_time if found.spec else 0.0
     law = sampled(
         ProportionalDerivative(
             proportional=bandwidth**2 / found.unit,
@@ -107,7 +106,8 @@ def design(
     pulsed = Modulated(
         law=law,
         sampling=period,
-        modulators=(modulation.modulator(period, least),),
+        # The valve keeps to its minimum on-time unasked; the modulator knows nothing of it.
+        modulators=(modulation.modulator(period, 0.0),),
         levels=(found.spec.levels[-1] if found.spec else 1.0,),
     )
     return pulsed, ()

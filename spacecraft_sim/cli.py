@@ -91,6 +91,9 @@ def _parser() -> argparse.ArgumentParser:
     margins.add_argument("name", metavar="NAME", help="scenario, or path of a TOML file")
     margins.add_argument("--out", type=Path, help="folder to write margins.json to")
     margins.add_argument("--linear", action="store_true", help="leave out the flights")
+    margins.add_argument(
+        "--relay", type=float, default=1.5, metavar="N_m", help="level of relay thrusters, N m"
+    )
     margins.add_argument("--set", help="change a key of the scenario", **settings)
     export = command(cli_tools.export, "write the complete MJCF of a spacecraft as one file")
     export.add_argument("name", metavar="NAME", help="spacecraft or scenario, or path of its TOML")

@@ -2,7 +2,7 @@
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,9 @@ from spacecraft_sim.terminal import FAILS, HOLDS
 from spacecraft_sim.versions import require_supported_mujoco
 
 if TYPE_CHECKING:
+    from spacecraft_sim.margins import Relay, Saturation
     from spacecraft_sim.mission import Mission
+    from spacecraft_sim.scenario import Scenario
 
 # -- compare ---------------------------------------------------------------------------------------
 
@@ -81,43 +83,106 @@ def margins(arguments: argparse.Namespace) -> int:
     Returns:
         The exit code.
     """
-    mission = terminal.assemble(arguments)
+    require_supported_mujoco()
+    from controllers.modulation_claims import Pointing
     from spacecraft_sim import margins, run_folder
+    from spacecraft_sim.mission import assemble, load_scenario
 
+    def ready(*settings: str, pulsed: bool = False) -> "Mission":
+        scenario = load_scenario(arguments.name, (*arguments.set, *settings))
+        return assemble(scenario if pulsed else _unmodulated(scenario))
+
+    scenario = load_scenario(arguments.name, tuple(arguments.set))
+    torques = _UNPULSED if "modulation" in scenario.controller else ()
+    mission = ready(*torques)
     settled = margins.settle(mission)
     found = margins.margins(settled, flown=not arguments.linear)
-    table = Table("", "linear loop", "MuJoCo", title=mission.scenario.title, box=None)
+    table = Table("", "linear loop", "MuJoCo", title=scenario.title, box=None)
     for margin in found:
         table.add_row(margin.name, *map(_milliseconds, (margin.linear, margin.flown)))
-    saturated = () if arguments.linear else margins.saturation(mission, _flights(arguments))
-    limits = Table("torques up to", "settled after", "distance in the end", box=None)
-    for row in saturated:
-        limits.add_row(f"{row.limit:.5g} N m", f"{row.settling:.5g} s", f"{row.distance:.3g}")
     console = terminal.console()
     console.print(table)
-    if saturated:
-        console.print(limits)
+    saturated, pulsed = (), ()
+    if not arguments.linear:
+        saturated = margins.saturation(
+            mission, lambda limit: ready(*torques, f"thrusters.all.levels=[{limit!r}]")
+        )
+        console.print(_saturation_table(saturated))
+    if not arguments.linear and isinstance(settled.law.formula, Pointing):
+        trials = _relay_trials(arguments.relay)
+        pulsed = margins.relays([ready(*trial, pulsed=True) for trial in trials])
+        console.print(_relay_table(pulsed, arguments.relay))
+    elif not arguments.linear:
+        console.print(
+            "relay thrusters: left out; what pulses leave is known of laws that turn a body to an "
+            "attitude, as in burkov-body-vectors-free"
+        )
     if arguments.out:
-        folder = run_folder.create(arguments.out, mission.scenario.name)
-        run_folder.write_margins(folder, mission.scenario, found, saturated)
+        folder = run_folder.create(arguments.out, scenario.name)
+        run_folder.write_margins(folder, scenario, found, saturated, pulsed)
         console.print(f"{folder / 'margins.json'}")
     return HOLDS
+
+
+def _unmodulated(scenario: "Scenario") -> "Scenario":
+    """The same flight with the torques of its law as they are."""
+    table = {k: value for k, value in scenario.controller.items() if k != "modulation"}
+    return scenario.model_copy(update={"controller": table})
+
+
+_UNPULSED = ("thrusters.all.proportional=true", "thrusters.all.min_on_time=0.0")
+# Ten samples of PWPF in a period of PWM; flights long enough for a limit cycle.
+_RELAYS = {  # period and minimum on-times by modulation, s
+    "pwm": (0.1, (0.01, 0.02, 0.05)),
+    "pwpf": (0.01, (0.02, 0.03)),
+}
+_RELAY_DURATION = 360.0  # s
+
+
+def _relay_trials(level: float) -> Iterator[tuple[str, ...]]:
+    """Settings of flights with relay thrusters of one level, N m."""
+    for kind, (period, on_times) in _RELAYS.items():
+        for least in on_times:
+            yield (
+                f"duration={_RELAY_DURATION}",
+                f"controller.period={period}",
+                f'controller.modulation={{kind="{kind}"}}',
+                f"thrusters.all={{proportional=false, levels=[{level!r}], min_on_time={least}}}",
+            )
+
+
+def _saturation_table(rows: "Sequence[Saturation]") -> Table:
+    table = Table("torques up to", "settled after", "distance in the end", box=None)
+    for row in rows:
+        table.add_row(f"{row.limit:.5g} N m", f"{row.settling:.5g} s", f"{row.distance:.3g}")
+    return table
+
+
+def _relay_table(rows: "Sequence[Relay]", level: float) -> Table:
+    """Angles and rates beside the rules of the modulators, and their shares of these."""
+    table = Table(
+        f"relays of {level:.5g} N m", "least pulse", "angle left", "dead band", "share",
+        "rate left", "one pulse", "share", "firings", "within", box=None,
+    )  # fmt: skip
+    for row in rows:
+        table.add_row(
+            row.modulation.upper(),
+            f"{1e3 * row.min_on_time:.5g} ms",
+            f"{row.angle:.3g} rad",
+            f"{row.dead_band:.3g} rad",
+            f"{row.angle / row.dead_band:.2f}",
+            f"{row.rate:.3g} rad/s",
+            f"{row.impulse:.3g} rad/s",
+            f"{row.rate / row.impulse:.2f}",
+            f"{row.firings:.2g} 1/s",
+            "yes" if row.within else "no",
+        )
+    return table
 
 
 def _milliseconds(time: float) -> str:
     """Nothing for what was not sought or not found."""
     return "" if math.isnan(time) else f"{1e3 * time:.5g} ms"
-
-
-def _flights(arguments: argparse.Namespace) -> "Callable[[float], Mission]":
-    """What assembles the same mission with other limits of its torques, N m."""
-    from spacecraft_sim import mission
-
-    def limited(limit: float) -> "Mission":
-        settings = (*arguments.set, f"thrusters.all.levels=[{limit!r}]")
-        return mission.assemble(mission.load_scenario(arguments.name, settings))
-
-    return limited
 
 
 # -- certify ---------------------------------------------------------------------------------------

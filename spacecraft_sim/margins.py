@@ -1,17 +1,18 @@
-"""What a sampled law bears on its machine: delay, sampling period, saturated torques.
+"""What a sampled law bears on its machine: delay, sampling period, limited torques, relays.
 
 The linear figures are of the loop linearised, from the compiled machine, where a flight settles;
 beside them stands what the same machine shows in flights from a small disturbance there.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from spacecraft_sim import compiled_dynamics
+from spacecraft_sim.chart import pulses
 from spacecraft_sim.dynamics import jacobian, linear_plant
 from spacecraft_sim.loop_margins import Loop, close, delay_margin, longest_period
 
@@ -21,6 +22,7 @@ _UPPER = 3.0  # longest sampling period looked at, s
 _FINE = 20  # samples in a delay, where continuous time is meant
 _KICK = 1e-6  # largest disturbance of an angle, rad, or a rate, rad/s
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05)  # of the largest torque, to which it is limited
+_JUDGED = 1 / 3  # last share of a flight with relay thrusters, in which pulses are counted
 _NEWTON = 3  # rounds: from 1e-3 of the scale to rounding
 _CYCLES = 30  # of the critical oscillation in a flight
 _SEEN = 1e-6  # share of a motion in the readings, below which the law does not see it
@@ -190,6 +192,60 @@ def saturation(mission: Any, limited: Callable[[float], Any]) -> tuple[Saturatio
                 limit=share * most,
                 settling=float(track.time[far[-1]]) if len(far) else 0.0,
                 distance=float(distance[-1]),
+            )
+        )
+    return tuple(rows)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relay:
+    """A flight with relay thrusters, judged in its last third against the rules of its modulators.
+
+    Attributes:
+        modulation: Which modulators.
+        min_on_time: Of the thrusters, s.
+        angle: Largest angle from the goal, rad.
+        dead_band: What the rule says of it, rad.
+        rate: Largest rate, rad/s.
+        impulse: What the rule says of it, one least pulse over the inertia, rad/s.
+        firings: Pulses a second, all thrusters together.
+        within: Whether both stay within what is granted beyond the rules.
+    """
+
+    modulation: str
+    min_on_time: float
+    angle: float
+    dead_band: float
+    rate: float
+    impulse: float
+    firings: float
+    within: bool
+
+
+def relays(missions: Sequence[Any]) -> tuple[Relay, ...]:
+    """Flies scenarios whose laws are modulated.
+
+    Args:
+        missions: The missions; their guarantees speak of an angle, in rad, and a rate, in rad/s.
+    """
+    rows = []
+    for mission in missions:
+        track, law = mission.fly(), mission.controller
+        by_unit = {g.unit: g.check(track) for g in mission.guarantees}
+        angle, rate = by_unit["rad"], by_unit["rad/s"]
+        begin = track.time[-1] * (1 - _JUDGED)
+        starts = [pulses(track.time, track[name])[0] for name in law.thrusters]
+        count = sum(int(np.count_nonzero(start >= begin)) for start in starts)
+        rows.append(
+            Relay(
+                modulation=mission.scenario.controller["modulation"]["kind"],
+                min_on_time=mission.thrusters["mujoco"][law.thrusters[0]].min_on_time,
+                angle=angle.measured,
+                dead_band=angle.predicted,
+                rate=rate.measured,
+                impulse=rate.predicted,
+                firings=count / (track.time[-1] - begin),
+                within=all(v.holds for v in by_unit.values()),
             )
         )
     return tuple(rows)

@@ -12,7 +12,7 @@ from spacecraft_sim.chart import Map, charts_of, vectors
 from spacecraft_sim.compare import Comparison
 from spacecraft_sim.families import is_quasi_rigid
 from spacecraft_sim.guarantee import Assumption, Verdict
-from spacecraft_sim.margins import Margin, Saturation
+from spacecraft_sim.margins import Margin, Relay, Saturation
 from spacecraft_sim.mission import Mission
 from spacecraft_sim.scenario import Scenario
 from spacecraft_sim.trajectory import Trajectory
@@ -110,20 +110,26 @@ def subject(mission: Mission) -> "Subject":
 
 
 def write_margins(
-    folder: Path, scenario: Scenario, found: Sequence[Margin], saturated: Sequence[Saturation]
+    folder: Path,
+    scenario: Scenario,
+    found: Sequence[Margin],
+    saturated: Sequence[Saturation],
+    pulsed: Sequence[Relay],
 ) -> None:
-    """Writes `margins.json`, times in s.
+    """Writes `margins.json`, in SI units.
 
     Args:
         folder: The folder.
         scenario: The scenario.
         found: Delay and sampling periods.
         saturated: Flights with limited torques.
+        pulsed: Flights with relay thrusters.
     """
     table = {
         "scenario": scenario.name,
         "margins": [{k: _number(v) for k, v in asdict(margin).items()} for margin in found],
         "saturation": [{k: _number(v) for k, v in asdict(row).items()} for row in saturated],
+        "relays": [{k: _number(v) for k, v in asdict(row).items()} for row in pulsed],
         "versions": versions(),
     }
     text = json.dumps(table, indent=2, allow_nan=False, ensure_ascii=False)

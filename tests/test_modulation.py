@@ -148,10 +148,21 @@ def test_a_pulse_lasts_its_minimum_on_time_in_whole_periods():
         assert np.diff(edges)[::2].min() == round(whole / 0.01)
 
 
+def test_a_modulator_that_would_answer_its_own_pulses_is_refused():
+    # tau log(K/(K - 2 U_on)) = 38 ms: a longer pulse carries the lag from U_on to -U_on.
+    PWPF.modulator(0.001, 0.038)
+    with pytest.raises(ValueError, match=r"lasts 0\.039 s at least; from 0\.0382338 s on it takes"):
+        PWPF.modulator(0.001, 0.039)
+    for least, answers in ((0.038, False), (0.039, True)):
+        modulator = dataclasses.replace(PWPF.modulator(0.001, 0.0), min_on_time=least)
+        fired = {c.sign for c in run(modulator, 1.001 * modulator.dead_band, 5000)}
+        assert (-1 in fired) is answers
+
+
 @given(
     r=st.lists(st.floats(-1.5, 1.5), min_size=2, max_size=60),
     least=st.floats(0.0, 0.1),
-    kind=st.sampled_from([PWM, PWPF]),
+    kind=st.sampled_from([PWM, Pwpf(kind="pwpf", time_constant=2.0)]),
 )
 def test_no_pulse_is_shorter_than_the_minimum_on_time(r, least, kind):
     modulator, channel, changes = kind.modulator(T, least), OFF, [(-math.inf, 0)]
