@@ -5,9 +5,7 @@ Each test shows that the corrected statement holds and that the printed one does
 
 import itertools
 import math
-import re
 from collections import deque
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -392,9 +390,3 @@ def test_19_the_listed_boom_leaves_small_deflections():
     assert off["listed"] > 0.02
     assert reach["authors'"] < 0.06
     assert drawn_in["authors'"] < 0.005
-
-
-def test_the_list_names_the_tests():
-    text = (Path(__file__).parent.parent / "controllers" / "ERRATA.md").read_text(encoding="utf-8")
-    proofs = {name for name in globals() if re.match(r"test_\d\d", name)}
-    assert set(re.findall(r"tests/test_errata\.py::(\w+)", text)) == proofs

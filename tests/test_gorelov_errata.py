@@ -1,4 +1,6 @@
-"""Misprints of Gorelov's method of moments; each corrected statement holds, the printed one not.
+"""The misprints of Gorelov (1999), listed in controllers/ERRATA.md.
+
+Each test shows that the corrected statement holds and that the printed one does not.
 
 Yu. N. Gorelov, "Synthesis of null-finite optimal control for a double integrator with an attached
 oscillator by the method of moments" (in Russian).

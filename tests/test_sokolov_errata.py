@@ -1,4 +1,6 @@
-"""Misprints in Sokolov (2004): the corrected statement holds and the printed one does not.
+"""The misprints of Sokolov (2004), listed in controllers/ERRATA.md.
+
+Each test shows that the corrected statement holds and that the printed one does not.
 
 B. N. Sokolov, Guaranteed estimate of the influence of elastic structural elements on the dynamics
 of the stabilization of its angular position under relay control; read in a text copy of the Russian
