@@ -1,6 +1,7 @@
 """The command `spacecraft-sim`: flights, and what is done beside them.
 
-Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or bad input, 3 the run diverged or crashed.
+Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or bad input, 3 the run diverged or crashed,
+or what it leaves cannot be written.
 A certificate holds if the attitude is guaranteed about each axis and every assumption holds.
 Heavy modules are imported by the commands that need them.
 """
@@ -49,6 +50,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ValueError as error:
         print(f"spacecraft-sim: {error}", file=sys.stderr)
         return BAD_INPUT
+    except OSError as error:
+        print(f"spacecraft-sim: {error}", file=sys.stderr)
+        return BROKEN
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -203,16 +207,21 @@ def _run(arguments: argparse.Namespace) -> int:
             recording.conclude(comparison.verdicts)
         run_folder.write_verdicts(folder, mission, comparison)
         run_folder.write_pictures(folder, mission, measured, predicted, comparison)
+    except OSError as error:
+        print(f"spacecraft-sim: {folder} cannot be written to its end: {error}", file=sys.stderr)
+        return BROKEN
     except Exception:
         traceback.print_exc()
         print(f"spacecraft-sim: the run crashed; what it wrote is in {folder}", file=sys.stderr)
         return BROKEN
-    if recording.trouble:
-        print(f"spacecraft-sim: the viewer was lost: {recording.trouble}", file=sys.stderr)
     console = terminal.console()
     console.print(_verdict_table(comparison))
     console.print(_difference_line(comparison))
     console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
+    for trouble in filter(None, (recording.lost_viewer, recording.lost_file)):
+        print(f"spacecraft-sim: {trouble}", file=sys.stderr)
+    if recording.lost_file:
+        return BROKEN
     console.print(f"open the recording:  rerun {folder / 'recording.rrd'}", highlight=False)
     return HOLDS if all(verdict.holds for verdict in comparison.verdicts) else FAILS
 

@@ -5,8 +5,10 @@ beforehand, of the reduced model or of another run; it says how large everything
 calls write a file, an open viewer, or both, in chunks; after each the file reads up to there.
 """
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
+from threading import Thread
 from types import TracebackType
 from uuid import uuid4
 
@@ -41,10 +43,12 @@ from spacecraft_sim.signal_groups import groups
 from spacecraft_sim.trajectory import Trajectory, selected
 
 APPLICATION = "spacecraft_sim"
-PATIENCE = 5.0  # how long a viewer may take for a chunk before the run goes on without it, s
+PATIENCE = 5.0  # how long file and viewer may take for a chunk before the run goes on without, s
 CHUNK = 1000  # rows of a flight that is over
 Nozzles = dict[str, list[record_scene.Nozzle]]
 LOOKS = 60  # instants of a flight at which it is looked how far an arm reaches
+_FOOTER = b"RRF2FOOT"  # and four bytes more end a file that is whole
+ROOM = 1_000_000  # bytes that a disk must have for a recording to begin
 PLUME = 0.25  # longest plume, in sizes of the spacecraft
 
 
@@ -65,19 +69,25 @@ def write(
         beneath: The other flight.
         verdicts: What became of the guarantees of the flight on top.
         page: What stands in place of the table of verdicts, as Markdown.
+
+    Raises:
+        OSError: If the file cannot be written to its end.
     """
     with Recording(subject, path) as recording:
         recording.expect(beneath)
         for k in range(0, len(measured.time), CHUNK):
             recording.take(selected(measured, slice(k, k + CHUNK)))
         recording.conclude(verdicts, page)
+    if recording.lost_file:
+        raise OSError(recording.lost_file)
 
 
 class Recording:
     """A recording that is being written; use it in a `with` statement, which completes the file.
 
     Attributes:
-        trouble: Why the viewer no longer gets the data; None while it does.
+        lost_viewer: Why the viewer no longer gets the data; None while it does.
+        lost_file: Why the file no longer gets the data; None while it does.
     """
 
     def __init__(self, subject: Subject, path: Path | None, viewer: str | None = None):
@@ -87,12 +97,18 @@ class Recording:
             subject: What it is about.
             path: The .rrd file; None for none.
             viewer: Address of an open viewer; None for none.
+
+        Raises:
+            OSError: If the file cannot be written.
         """
-        self.trouble: str | None = None
-        self._subject, self._viewer, self._patience = subject, viewer, PATIENCE
+        self.lost_viewer: str | None = None
+        self.lost_file: str | None = None
+        self._subject, self._path, self._viewer, self._patience = subject, path, viewer, PATIENCE
         self._stream = stream = rr.RecordingStream(APPLICATION, recording_id=uuid4())
         sinks = [rr.FileSink(path)] if path else []
         sinks += [rr.GrpcSink(viewer)] if viewer else []
+        if path:  # where there is no room at all, rerun waits for ever
+            path.write_bytes(bytes(ROOM))
         stream.set_sinks(*sinks)
         stream.send_recording_name(subject.title)
         self._rest = at_rest(subject.model, subject.machine)
@@ -114,7 +130,15 @@ class Recording:
         trace: TracebackType | None,
     ) -> None:
         self._flush()
-        self._stream.disconnect()  # writes the footer of the file
+        # It writes the footer of the file, and waits for ever for a disk that was full.
+        closing = Thread(target=self._stream.disconnect, daemon=True)
+        closing.start()
+        closing.join(4 * PATIENCE)
+        if closing.is_alive():
+            self._lose(f"not closed within {4 * PATIENCE:g} s")
+            rr.unregister_shutdown()  # at the end of the process it would wait again
+        elif self._path and not _whole(self._path):
+            self._lose("it has no footer")
 
     def expect(self, beneath: Beneath) -> None:
         """Takes the flight that is known beforehand, and lays out the views.
@@ -316,12 +340,26 @@ class Recording:
         self._stream.log(path, document, static=True)
 
     def _flush(self) -> None:
-        """Brings all that was logged to file and viewer; a viewer that is gone stops no run."""
+        """Brings all that was logged to file and viewer; neither stops the run if it is gone."""
         try:
             self._stream.flush(timeout_sec=self._patience)
         except RuntimeError as error:
-            self.trouble = self.trouble or str(error)
+            self._lose(str(error))
             self._patience = 0.0
+
+    def _lose(self, reason: str) -> None:
+        if self._path and (not self._viewer or "File-writer" in reason):
+            where = f"{self._path}: cannot be written to its end; is the disk full?"
+            self.lost_file = self.lost_file or f"{where} ({reason})"
+        else:
+            self.lost_viewer = self.lost_viewer or f"the viewer was lost: {reason}"
 
     def _root(self, key: str) -> str:
         return f"world/{key}"
+
+
+def _whole(path: Path) -> bool:
+    """Whether a file ends as one that was closed."""
+    with path.open("rb") as file:
+        file.seek(-len(_FOOTER) - 4, os.SEEK_END)
+        return file.read(len(_FOOTER)) == _FOOTER

@@ -1,5 +1,6 @@
 """Repairs the recording of a run that was killed: keeps what reads and writes the footer."""
 
+import shutil
 import subprocess
 import tempfile
 import warnings
@@ -23,7 +24,8 @@ def repair(path: Path) -> bool:
         Whether anything was wrong; if not, the file is left as it was.
 
     Raises:
-        ValueError: If it is no recording, or nothing of it can be read.
+        ValueError: If it is no recording, nothing of it can be read, or the repaired one has no
+            room beside it.
     """
     try:
         with path.open("rb") as file:
@@ -34,13 +36,16 @@ def repair(path: Path) -> bool:
         raise ValueError(f"{path}: not a recording; an .rrd file begins with {_MAGIC.decode()!r}")
     if _rerun("verify", str(path)) is None and _holds_something(path):
         return False
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".repair-") as folder:
-        whole = Path(folder) / path.name
-        fault = _rerun("merge", str(path), "--continue-on-error", "--output", str(whole))
-        fault = fault or _rerun("verify", str(whole))
-        if fault or not _holds_something(whole):
-            raise ValueError(f"{path}: nothing of it can be read{f': {fault}' if fault else ''}")
-        whole.replace(path)
+    size, free = path.stat().st_size, shutil.disk_usage(path.parent).free
+    if free < size:
+        raise ValueError(
+            f"{path}: the repaired one is written beside it and takes {size / 1e6:.1f} MB; "
+            f"{free / 1e6:.1f} MB are free: make room, or copy it to another disk"
+        )
+    try:
+        _replace(path)
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be replaced: {error.strerror}") from error
     return True
 
 
@@ -57,6 +62,16 @@ def end(path: Path) -> float:
             nanoseconds = batch.column(TIMELINE).cast("int64").to_numpy()
             last = max(last, int(nanoseconds.max(initial=0)))
     return last / 1e9
+
+
+def _replace(path: Path) -> None:
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".repair-") as folder:
+        whole = Path(folder) / path.name
+        fault = _rerun("merge", str(path), "--continue-on-error", "--output", str(whole))
+        fault = fault or _rerun("verify", str(whole))
+        if fault or not _holds_something(whole):
+            raise ValueError(f"{path}: nothing of it can be read{f': {fault}' if fault else ''}")
+        whole.replace(path)
 
 
 def _holds_something(path: Path) -> bool:

@@ -4,7 +4,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,6 +118,27 @@ def test_what_cannot_be_repaired_is_refused_and_left_alone(data, word, tmp_path,
     assert word in message
     assert str(path) in message
     assert [p.read_bytes() for p in tmp_path.iterdir()] == ([] if data is None else [data])
+
+
+def test_without_room_for_the_repaired_file_the_broken_one_is_left(broken, tmp_path, monkeypatch):
+    path, free = shutil.copy(broken, tmp_path / "recording.rrd"), broken.stat().st_size - 1
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+    with pytest.raises(ValueError, match=r"takes 1\.\d MB; 1\.\d MB are free: make room"):
+        repair(path)
+    assert path.read_bytes() == broken.read_bytes()
+
+
+@pytest.mark.parametrize("place", ["mkdtemp", "replace"])
+def test_a_folder_that_takes_no_files_is_told(place, broken, tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    owner = tempfile if place == "mkdtemp" else Path
+    monkeypatch.setattr(owner, place, refuse)
+    path = shutil.copy(broken, tmp_path / "recording.rrd")
+    with pytest.raises(ValueError, match=r"recording\.rrd: cannot be replaced: Permission denied"):
+        repair(path)
+    assert path.read_bytes() == broken.read_bytes()
 
 
 @pytest.mark.slow
