@@ -10,26 +10,24 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec, GridSpecBase
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from spacecraft_sim import spans
 from spacecraft_sim.drawing import Drawing, channel_units
 from spacecraft_sim.guarantee import Verdict
-from spacecraft_sim.plots_film import BOOMS, INK, MINUS, PLUS, SHADE, SOFT, film
+from spacecraft_sim.plots_film import BOOMS, INK, MINUS, PLUS, SOFT, film
+from spacecraft_sim.plots_table import BAD, GOOD, ROW, table
 from spacecraft_sim.trajectory import Trajectory, between_rows, moving_axes
 
 Array = np.ndarray
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
 
 WIDTH, DPI, FRAMES = 18.0, 100, 6  # inches, dots an inch, pictures in the film strip
-PLANTS = (("reduced", "#f29b38", 3.2), ("MuJoCo", "#1f6fd6", 1.2))  # the thin over the wide line
-GOOD, BAD = "#1f8f4d", "#c62828"
+Plants = tuple[tuple[str, str, float], ...]  # name, colour and width of the lines of each
+PLANTS: Plants = (("reduced", "#f29b38", 3.2), ("MuJoCo", "#1f6fd6", 1.2))  # thin over wide
+SMOOTH: Plants = (("reduced: wide and pale", "#c3c9d4", 5.0), ("MuJoCo", INK, 1.2))  # many colours
 DASHES = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)))  # of the axis that moves most, and of the others
-COLUMNS = {"claim": 0.035, "predicted": 0.515, "measured": 0.63, "bound": 0.75}
-COLUMNS |= {"unit": 0.77, "margin": 0.92, "worst at": 0.995}
 REST = 1e-9  # share of the angle, and rad/s, that count as no motion
-ROW = 0.3  # height of a row of the table, inches
 FEW = 3000  # rows of a track that is drawn between them too
 DENSE = 160  # commands in a panel that would hide what they cross
 
@@ -61,10 +59,10 @@ def summary(
     """
     channels, bands = channel_units(measured, drawing), bands or {}
     lanes = max(1.0, 0.42 * len(channels))  # inches
-    table = ROW * (len(verdicts) + 1)
-    heights = [1.9, 2.3, 2.3, table if histories else max(table, 2 * lanes + 0.6)]
-    gap = 0.8 if histories else 0.62  # which have keys of their own
-    edges = np.cumsum([1.12, heights[0], 0.55, heights[1], gap, heights[2], 0.72, heights[3]])
+    claims = ROW * (len(verdicts) + 1)  # inches
+    heights = [1.9, 2.3, 2.3, claims if histories else max(claims, 2 * lanes + 0.6)]
+    keys = 0.85 if histories else 0.62  # stand under the panels of the upper row
+    edges = np.cumsum([1.12, heights[0], 0.55, heights[1], keys, heights[2], 0.72, heights[3]])
     height = edges[-1] + 0.4
     figure = Figure(figsize=(WIDTH, height), dpi=DPI)
     FigureCanvasAgg(figure)  # the figure keeps it
@@ -74,7 +72,9 @@ def summary(
     strip = [figure.add_subplot(cell) for cell in _grid(figure, rows[0], FRAMES, 0.012, 0.03)]
     note = film(strip, drawing, measured)
     figure.text(0.012, 1 - 0.72 / height, note, size=9.5, color=SOFT, va="center")
-    _key(figure, 1 - 0.72 / height, [] if histories else moving_axes(measured, "attitude"), bands)
+    plants = SMOOTH if histories else PLANTS
+    moving = () if histories else moving_axes(measured, "attitude")
+    _key(figure, 1 - 0.72 / height, plants, moving, bands)
     if law:
         for cell, draw in zip([*_grid(figure, rows[2], len(law), 0.05, 0.19)], law, strict=True):  # pyright: ignore
             draw(figure.add_subplot(cell), (predicted, measured))
@@ -93,10 +93,10 @@ def summary(
             _phase_plane(panels[3], flights, bands, zoom)
         _side(figure, row, "END OF THE FLIGHT" if zoom else "WHOLE FLIGHT")
     if histories:  # which show the torques
-        _table(figure.add_subplot(_grid(figure, rows[3], 1, 0.012, 0.0)[0]), verdicts)
+        table(figure.add_subplot(_grid(figure, rows[3], 1, 0.012, 0.0)[0]), verdicts)
     else:
-        table, thrust = _grid(figure, rows[3], 2, 0.012, 0.1, (2, 1))
-        _table(figure.add_subplot(table), verdicts)
+        left, thrust = _grid(figure, rows[3], 2, 0.012, 0.1, (2, 1))
+        table(figure.add_subplot(left), verdicts)
         _lanes(figure, thrust.subgridspec(2, 1, hspace=0.55 / lanes), measured, channels)
     figure.savefig(path, pil_kwargs={"compress_level": 3})
 
@@ -120,9 +120,11 @@ def _heading(figure: Figure, title: str, verdicts: Sequence[Verdict], y: float) 
     figure.text(0.988, y, f"{kept} of {len(verdicts)} claims hold", **style)
 
 
-def _key(figure: Figure, y: float, axes: Sequence[str], bands: Mapping[str, float]) -> None:
+def _key(
+    figure: Figure, y: float, plants: Plants, axes: Sequence[str], bands: Mapping[str, float]
+) -> None:
     """One key for the page, so that none covers a curve."""
-    entries = [(name, color, width, "-") for name, color, width in PLANTS]
+    entries = [(name, color, width, "-") for name, color, width in plants]
     if len(axes) > 1:
         entries += [(a, INK, 1.4, dashes) for a, dashes in zip(axes, DASHES, strict=False)]
     if bands:
@@ -153,6 +155,10 @@ def panel(axes: Axes, title: str, x: str = "", y: str = "", below: bool = False)
     axes.tick_params(labelsize=8.5, colors=SOFT, length=3)
     axes.grid(color="#e3e7ee", linewidth=0.7)
     axes.set_axisbelow(True)
+    for axis in (axes.xaxis, axes.yaxis):  # an offset would stand in the title
+        if isinstance(shown := axis.get_major_formatter(), ScalarFormatter):
+            shown.set_useOffset(False)
+            shown.set_scientific(False)
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color("#b9c0cc")
     handles = axes.get_legend_handles_labels()[0]
@@ -171,7 +177,8 @@ def _angle(axes: Axes, flights: Flights, kind: str, bands: Mapping[str, float], 
     """An angle with its own bands filled and those of the other angle dotted."""
     own = {name: half for name, half in bands.items() if name[:-2] == kind}
     others = [half for name, half in bands.items() if name not in own]
-    peak, scale, unit = _histories(axes, flights, kind, max(own.values(), default=0.0))
+    shown = [*own.values(), *(others if zoom else ())]
+    peak, scale, unit = _histories(axes, flights, kind, max(shown, default=0.0))
     for name, half in own.items():
         dashes = DASHES[moving_axes(flights[1], kind).index(name[-1]) % 3] if len(own) > 1 else "-"
         axes.axhspan(-half / scale, half / scale, color=GOOD, alpha=0.10, linewidth=0)
@@ -211,7 +218,7 @@ def _histories(
         look = {"color": color, "linewidth": width, "linestyle": dashes}
         axes.plot(time, (value - base) / scale, **look)
     time_axis(axes, flights[1].time[0], flights[1].time[-1])
-    return peak / scale, scale, f"{letter}rad{f' from {base:.6g} rad' if base else ''}"
+    return peak / scale, scale, f"{letter}rad{_from(base, 'rad')}"
 
 
 def _base(values: Sequence[Array]) -> float:
@@ -222,6 +229,10 @@ def _base(values: Sequence[Array]) -> float:
     if span > 2e-3 * size or size == 0:
         return 0.0
     return round((low + high) / 2, -math.floor(math.log10(max(span, 1e-6 * size))) - 1)
+
+
+def _from(base: float, unit: str) -> str:
+    return f" from {base:.6g} {unit}" if base else ""
 
 
 def time_axis(axes: Axes, start: float, end: float) -> None:
@@ -271,18 +282,27 @@ def _phase_plane(axes: Axes, flights: Flights, bands: Mapping[str, float], zoom:
         axes.plot(0, 0, "o", color=INK, markersize=4)
         axes.set(xticks=[], yticks=[])
         return panel(axes, f"Phase plane {axis}: at rest at {angle[-1]:.4g} rad")
-    (sx, px), (sy, py) = prefix(_peak(angle)), prefix(_peak(rate))
-    for flight, (_, color, width) in zip(flights, PLANTS, strict=True):
-        if x in flight.signals and y in flight.signals:
-            track = np.stack([flight[x], flight[y]], axis=1)
-            if len(track) < FEW:  # the rows alone would be corners
-                track = between_rows(flight.time, flight[x], flight[y]).reshape(-1, 2)
-            axes.plot(*(track / (sx, sy)).T, color=color, linewidth=width)
+    drawn = [
+        (flight, color, width)
+        for flight, (_, color, width) in zip(flights, PLANTS, strict=True)
+        if x in flight.signals and y in flight.signals
+    ]
+    base = np.array([_base([flight[name] for flight, *_ in drawn]) for name in (x, y)])
+    (sx, px), (sy, py) = (
+        prefix(max(_peak(flight[name] - from_) for flight, *_ in drawn))
+        for name, from_ in zip((x, y), base, strict=True)
+    )
+    for flight, color, width in drawn:
+        track = np.stack([flight[x], flight[y]], axis=1)
+        if len(track) < FEW:  # the rows alone would be corners
+            track = between_rows(flight.time, flight[x], flight[y]).reshape(-1, 2)
+        axes.plot(*((track - base) / (sx, sy)).T, color=color, linewidth=width)
     if not zoom:
-        axes.plot(angle[0] / sx, rate[0] / sy, "o", color=INK, markersize=4)
+        axes.plot((angle[0] - base[0]) / sx, (rate[0] - base[1]) / sy, "o", color=INK, markersize=4)
         if half := bands.get(x, 0.0):
             axes.axvspan(-half / sx, half / sx, color=GOOD, alpha=0.15, linewidth=0)
-    return panel(axes, f"Phase plane {axis}: {py}rad/s over {px}rad")
+    angles, rates = _from(base[0], "rad"), _from(base[1], "rad/s")
+    return panel(axes, f"Phase plane {axis}: {py}rad/s{rates} over {px}rad{angles}")
 
 
 def _lanes(
@@ -326,13 +346,17 @@ def _thrust(
         ticks[middle] = "0"
         if len(channels) == 1:
             few = {levels[0], levels[-1]} if len(levels) else ()
+            if len(few) == 2 and height(levels[0]) > 0.7:  # their figures would cover each other
+                few = {levels[-1]}
             ticks |= {middle + float(height(v)): f"{v:+.3g}" for e in few for v in (e, -e)}
             continue
         words = f"{channel} ±{levels[-1]:.3g}" if len(levels) else f"{channel}: never on"
         place = {"transform": axes.get_yaxis_transform(), "va": "bottom", "zorder": 5}
         axes.text(0.004, middle + 1.05, words, size=8.5, color=INK, **place)
     axes.set_yticks(list(ticks), list(ticks.values()))
-    axes.set_ylim(-pitch * max(len(channels) - 1, 0) - 1.2, pitch - 1.2)
+    axes.set_ylim(
+        -pitch * max(len(channels) - 1, 0) - 1.2, pitch - (0.4 if len(channels) > 1 else 1.2)
+    )
     time_axis(axes, *span)
     return dense
 
@@ -347,37 +371,6 @@ def _log_heights(levels: Array) -> Callable[[Array], Array]:
         return np.sign(thrust) * np.where(size < 1, size, above) / (1 + np.log10(most / least))
 
     return height
-
-
-def _table(axes: Axes, verdicts: Sequence[Verdict]) -> None:
-    axes.set_axis_off()
-    axes.set(xlim=(0, 1), ylim=(axes.get_window_extent().height / DPI / ROW, 0))
-    axes.plot([0, 1], [0.95, 0.95], color=INK, linewidth=1)
-    for head, x in COLUMNS.items():
-        side = "left" if head in ("claim", "unit") else "right"
-        axes.text(x, 0.5, head, ha=side, va="center", size=9, color=SOFT, weight="bold")
-        for k, v in enumerate(verdicts, start=1):
-            color = INK if head != "margin" else GOOD if v.holds else BAD
-            axes.text(x, k + 0.5, _cell(v, head), ha=side, va="center", size=9.5, color=color)
-    for k, v in enumerate(verdicts, start=1):
-        color, mark = (GOOD, "✔") if v.holds else (BAD, "✘")
-        axes.add_patch(Rectangle((0, k + 0.1), 0.006, 0.8, color=color, linewidth=0))
-        axes.text(0.02, k + 0.5, mark, color=color, ha="center", va="center", size=11)
-        if k % 2 == 0:
-            axes.add_patch(Rectangle((0, k), 1, 1, color=SHADE, linewidth=0, zorder=0))
-
-
-def _cell(v: Verdict, head: str) -> str:
-    if head == "claim":
-        claim = f"not guaranteed: {v.claim}" if v.failed else v.claim
-        return claim if len(claim) <= 62 else f"{claim[:61]}…"
-    if head == "predicted":
-        return "" if v.predicted is None else f"{v.predicted:.4g}"
-    if head == "worst at":
-        return "" if v.t_worst is None else f"{v.t_worst:.1f} s"
-    bound = f"{'±' if v.kind == 'within' else '≤ '}{v.bound:.3g}"
-    margin = f"{100 * v.margin:.1f} %" if v.margin > -10 else f"{100 * v.margin:.2g} %"
-    return {"measured": f"{v.measured:.4g}", "bound": bound, "unit": v.unit, "margin": margin}[head]
 
 
 def _since(flight: Trajectory, start: float) -> Trajectory:
@@ -396,5 +389,5 @@ def prefix(peak: float) -> tuple[float, str]:
     Args:
         peak: The largest value, in the unit itself.
     """
-    prefixes = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+    prefixes = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"), (1e-15, "f"))
     return next((p for p in prefixes if peak >= p[0] / 2), prefixes[0])

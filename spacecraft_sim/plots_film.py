@@ -1,5 +1,7 @@
 """A strip of pictures of the bending spacecraft, drawn from its geometry without OpenGL."""
 
+import math
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Polygon
@@ -17,8 +19,7 @@ INK, SOFT, SHADE = "#1d2430", "#6b7484", "#f4f6fa"
 PLUS, MINUS = "#d8432f", "#2b6cd4"
 BOOMS = ("#1f8f4d", "#8a4fd0", "#c98a00", "#178d99", "#d0437a")
 _WAY = 0.98  # share of its way after which a machine is all but at rest
-_FAINT = 0.03  # share of the largest thrust below which no arrow is drawn
-_SMOOTH = 16  # more values than levels of a relay has a thrust that follows a command
+LEAST = 1e-3  # share of a channel's peak below which it counts as off
 _ARC = np.radians(np.linspace(25, 155, 24))  # of the arrow that stands for a torque
 
 
@@ -119,31 +120,32 @@ def _arrows(
 ) -> str:
     """Draws the thrust as arrows, an arc for a torque; returns its figures."""
     row = int(np.searchsorted(measured.time, drawing.time[frame], side="right")) - 1
+    units = channel_units(measured, drawing)
+    peaks = {channel: float(np.abs(measured[channel]).max()) for channel in units}
+    now = {channel: float(measured[channel][row]) for channel in units}
+    now = {channel: level for channel, level in now.items() if abs(level) > LEAST * peaks[channel]}
     for jet in drawing.jets:
-        level = _level(measured[jet.channel], row)
-        line = _arrow(jet, drawing, frame, view, size * level) if level else None
+        level = now.get(jet.channel, 0.0)
+        share = 0.5 + 0.5 * abs(level) / (peaks[jet.channel] or 1.0)  # the smallest can be seen
+        reach = math.copysign(size * share, level)
+        line = _arrow(jet, drawing, frame, view, reach) if level else None
         if line is not None:
             style = {"color": PLUS if level > 0 else MINUS, "linewidth": 2, "zorder": 99}
             patch = FancyArrowPatch(path=Line(line), arrowstyle="-|>", mutation_scale=14, **style)
             axes.add_patch(patch)
-    channels = channel_units(measured, drawing)
-    on = [f"{measured[c][row]:+.3g} {unit}" for c, unit in channels.items() if measured[c][row]]
-    if len(on) > 2 and all(_smooth(measured[c]) for c in channels):
-        most = max(channels, key=lambda c: abs(measured[c][row]))
-        return f"{most.replace('_', ' ')} {measured[most][row]:+.2g} {channels[most]}"
-    return ", ".join(on) if 0 < len(on) < 3 else f"{len(on)} thrusters on" if on else "thrust off"
+    return _thrust(now, units)
 
 
-def _smooth(thrust: Array) -> bool:
-    return len(np.unique(thrust)) > _SMOOTH
-
-
-def _level(thrust: Array, row: int) -> float:
-    """Sign of a thrust; times its share of the largest, if it follows its command."""
-    if not _smooth(thrust):
-        return float(np.sign(thrust[row]))
-    share = thrust[row] / np.abs(thrust).max()
-    return float(np.sign(share) * max(abs(share), 0.3)) if abs(share) > _FAINT else 0.0
+def _thrust(now: dict[str, float], units: dict[str, str]) -> str:
+    """What the channels do, in few words."""
+    if not now:
+        return "thrust off"
+    if len(now) > 2:
+        return f"{len(now)} of {len(units)} channels on"
+    figures, kinds = [f"{level:+.3g}" for level in now.values()], {units[c] for c in now}
+    if len(kinds) == 1:
+        return f"{', '.join(figures)} {kinds.pop()}"
+    return ", ".join(f"{x} {units[channel]}" for channel, x in zip(now, figures, strict=True))
 
 
 def _arrow(jet: Jet, drawing: Drawing, frame: int, view: View, size: float) -> Array | None:

@@ -1,17 +1,20 @@
 """Panels of a flight's page for machines without a quasi-rigid motion: arms and turning bodies."""
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 
 from spacecraft_sim.families import families
-from spacecraft_sim.plots import PLANTS, Flights, panel, prefix, time_axis
+from spacecraft_sim.plots import Flights, panel, prefix, time_axis
 from spacecraft_sim.plots_film import BOOMS
 from spacecraft_sim.trajectory import Trajectory
 
 Panel = Callable[[Axes, Flights, bool], None]  # draws the whole flight, or its end
-_SHOWN = 9  # curves that a panel can carry
+COLORS = (*BOOMS, "#2b6cd4", "#8a5a33", "#6b7484", "#97a800")  # of the curves of a panel
+UNIT_VECTORS = "of unit vectors"  # in place of a unit
 _LEAST = 1e-17  # difference that a logarithmic axis shows as zero
 
 
@@ -33,20 +36,18 @@ def _curves(title: str, names: Sequence[str], measured: Trajectory) -> Panel:
     def draw(axes: Axes, flights: Flights, zoom: bool) -> None:
         peak = max((float(np.abs(flights[1][n]).max()) for n in names), default=0.0)
         scale, letter = prefix(peak)
-        for k, name in enumerate(names[:_SHOWN]):
+        for k, name in enumerate(names[: len(COLORS)]):
             if name in flights[0].signals:
-                look = {"color": PLANTS[0][1], "linewidth": 3.2, "alpha": 0.45}
-                axes.plot(flights[0].time, flights[0][name] / scale, **look)
-            dashes = ("-", "--")[k // len(BOOMS)]
-            look = {"color": BOOMS[k % len(BOOMS)], "linewidth": 1.2, "linestyle": dashes}
+                values = flights[0][name] / scale
+                axes.plot(flights[0].time, values, color=COLORS[k], linewidth=5.0, alpha=0.3)
             values = flights[1][name] / scale
             words = name.removesuffix("_rate").replace("_", " ")
             label = None if zoom else words  # the panel above has the key
-            axes.plot(flights[1].time, values, label=label, **look)
+            axes.plot(flights[1].time, values, label=label, color=COLORS[k], linewidth=1.2)
         time_axis(axes, flights[1].time[0], flights[1].time[-1])
         unit = "N m" if title == "Torques" else measured.units[names[0]] if names else ""
-        more = f"; {_SHOWN} of {len(names)}" if len(names) > _SHOWN else ""
-        panel(axes, f"{title}{f', {letter}{unit}' if unit else ''}{more}", below=True)
+        more = f"; {len(COLORS)} of {len(names)}" if len(names) > len(COLORS) else ""
+        panel(axes, f"{title}, {f'{letter}{unit}' if unit else UNIT_VECTORS}{more}", below=True)
 
     return draw
 
@@ -57,13 +58,16 @@ def _difference(names: Sequence[str], measured: Trajectory) -> Panel:
     def draw(axes: Axes, flights: Flights, zoom: bool) -> None:
         predicted, flown = flights
         time, i, j = np.intersect1d(predicted.time, flown.time, return_indices=True)
-        for k, name in enumerate(n for n in names[:_SHOWN] if n in predicted.signals):
+        for k, name in enumerate(n for n in names[: len(COLORS)] if n in predicted.signals):
             gap = np.maximum(np.abs(flown[name][j] - predicted[name][i]), _LEAST)
-            look = {"color": BOOMS[k % len(BOOMS)], "linewidth": 1.0}
+            look = {"color": COLORS[k], "linewidth": 1.0}
             label = None if zoom else name.replace("_", " ")
             axes.semilogy(time, gap, label=label, **look)
         time_axis(axes, flown.time[0], flown.time[-1])
+        low, high = np.log10(axes.get_ylim())
+        axes.set_ylim(10.0 ** math.floor(low), 10.0 ** math.ceil(high))  # whole decades have names
+        axes.yaxis.set_minor_formatter(NullFormatter())
         unit = measured.units[names[0]] if names else ""
-        panel(axes, f"MuJoCo minus reduced{', ' if unit else ''}{unit}", below=True)
+        panel(axes, f"MuJoCo minus reduced, {unit or UNIT_VECTORS}", below=True)
 
     return draw

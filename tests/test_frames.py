@@ -148,7 +148,8 @@ def test_frames_are_thinned_to_one_a_tenth_of_a_second_with_both_ends(times):
 
 
 @pytest.mark.parametrize(
-    ("end", "every"), [(0.0, 0.02), (8.0, 0.02), (50.0, 0.05), (100.0, 0.1), (448.8, 0.1), (3600.0, 0.2)]
+    ("end", "every"),
+    [(0.0, 0.02), (8.0, 0.02), (50.0, 0.05), (100.0, 0.1), (448.8, 0.1), (3600.0, 0.2)],
 )
 def test_frames_are_close_enough_to_watch_and_few_enough_to_store(end, every):
     still = Trajectory(time=np.array([0.0, end]), signals={}, units={})

@@ -5,15 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flown import FREE, ON_AN_AXIS, flown
-from hypothesis import given
-from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import FancyArrowPatch
 
-from spacecraft_sim import plots, plots_chart, plots_smooth, sketch, spans
-from spacecraft_sim.chart import charts_of
-from spacecraft_sim.drawing import Shape, turned
+from spacecraft_sim import plots, plots_chart, plots_film, plots_law, plots_smooth, spans
+from spacecraft_sim.chart import charts_of, vectors
 from spacecraft_sim.families import families, is_quasi_rigid
 from spacecraft_sim.trajectory import Trajectory
 
@@ -31,11 +28,6 @@ def body():
     return flown("duration=1.0", name="burkov-body-vectors-free")
 
 
-def shape(kind, size, position=(0, 0, 0), quaternion=(1, 0, 0, 0)):
-    parts = {"size": size, "position": position, "quaternion": quaternion, "rgba": (1, 1, 1, 1)}
-    return Shape(body="bus", kind=kind, **{k: np.array(v, float) for k, v in parts.items()})
-
-
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     """Draws the summary of a flight, once; returns the figure and the pixels."""
@@ -43,6 +35,7 @@ def page(tmp_path_factory):
 
     def draw(flight):
         if id(flight) not in drawn:
+            charts = charts_of(flight.mission.controller)
             kept, save = [], Figure.savefig
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(
@@ -58,109 +51,13 @@ def page(tmp_path_factory):
                     bands=flight.mission.bands,
                     histories=None
                     if is_quasi_rigid(flight.predicted)
-                    else plots_smooth.panels(flight.measured),
+                    else plots_smooth.panels(flight.measured, vectors(charts, flight.measured)),
+                    law=plots_law.panels(charts, flight.measured),
                 )
             drawn[id(flight)] = flight, kept[0], imread(path)  # the flight too: ids are used again
         return drawn[id(flight)][1:]
 
     return draw
-
-
-# -- the spacecraft as a line drawing --------------------------------------------------------------
-
-
-@pytest.mark.parametrize("view", [sketch.TOP, sketch.ISOMETRIC], ids=lambda view: view.words)
-def test_a_view_is_a_right_handed_frame(view):
-    frame = np.stack([view.right, view.up, view.near])
-    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)  # rounding
-    assert np.linalg.det(frame) == pytest.approx(1.0)
-
-
-def test_the_isometric_view_shows_all_axes_equally_long():
-    lengths = np.linalg.norm(sketch.ISOMETRIC.project(np.eye(3)), axis=1)
-    np.testing.assert_allclose(lengths, np.sqrt(2 / 3), rtol=1e-15)
-
-
-def test_planar_flights_are_seen_from_above_and_others_from_aside():
-    assert sketch.view_of(flown(*PLANAR).drawing) is sketch.TOP
-    assert sketch.view_of(flown(*TUMBLING).drawing) is sketch.ISOMETRIC
-
-
-def test_faces_of_a_box_look_outwards():
-    points = sketch.surface(shape("box", (1, 2, 3)))
-    for corners in sketch.BOX_FACES:
-        a, b, c, d = points[list(corners)]
-        normal, middle = np.cross(b - a, c - a), (a + b + c + d) / 4
-        assert normal @ middle > 0
-        np.testing.assert_allclose(np.cross(normal, middle), 0, atol=1e-12)
-        np.testing.assert_allclose(a + c, b + d)  # in turn round the face, not across
-
-
-@pytest.mark.parametrize(
-    ("kind", "size", "reach"),
-    [
-        ("box", (1.0, 2.0, 3.0), (1, 2, 3)),
-        ("sphere", (0.5, 0.0, 0.0), (0.5, 0.5, 0.5)),
-        ("capsule", (0.5, 2.0, 0.0), (0.5, 0.5, 2.5)),
-        ("cylinder", (0.5, 2.0, 0.0), (0.5, 0.5, 2.0)),
-        ("ellipsoid", (1.0, 2.0, 3.0), (1, 2, 3)),
-    ],
-)
-def test_surfaces_reach_as_far_as_the_shapes(kind, size, reach):
-    np.testing.assert_allclose(np.abs(sketch.surface(shape(kind, size))).max(axis=0), reach)
-    # A quarter turn about x sends z to -y; then everything is moved.
-    turn = (np.sqrt(0.5), np.sqrt(0.5), 0, 0)
-    moved = sketch.surface(shape(kind, size, (5, 0, 0), turn)) - [5, 0, 0]
-    x, y, z = reach
-    np.testing.assert_allclose(np.abs(moved).max(axis=0), (x, z, y), atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("values", "base"),
-    [
-        ([0.7, 0.70005], 0.7),
-        ([0.70012, 0.70005], 0.7001),
-        ([0.7, 0.71], 0.0),  # it can be read as it is
-        ([-1e-6, 1e-6], 0.0),
-        ([0.0], 0.0),
-        ([], 0.0),
-        ([-0.7], -0.7),
-    ],
-)
-def test_what_differs_little_is_measured_from_a_round_number(values, base):
-    found = plots._base([np.array([value]) for value in values])
-    assert found == pytest.approx(base, abs=1e-12)
-
-
-@given(st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=1, max_size=30))
-def test_an_outline_is_what_lies_furthest_out(points):
-    points = np.array(points, float)
-    kept = points[sketch.outline(points)]
-    for angle in np.radians(np.arange(0, 360, 10)):
-        way = np.array([np.cos(angle), np.sin(angle)])
-        assert (kept @ way).max() >= (points @ way).max() - 1e-12
-
-
-def test_exaggeration_is_round_and_leaves_booms_recognisable():
-    straight = np.zeros((1, 2, 3))
-    straight[0, 1, 0] = 10.0
-
-    def factor(off):
-        bent = straight.copy()
-        bent[0, 1, 1] = off
-        return sketch.exaggeration([(bent, straight)])
-
-    assert [factor(x) for x in (3.0, 1.0, 0.5, 0.1, 0.001)] == [1.0, 2.0, 5.0, 20.0, 100.0]
-    assert sketch.exaggeration([]) == 1.0
-
-
-def test_boom_lines_start_at_the_roots_of_the_bus():
-    drawing = flown(*PLANAR).drawing
-    lines = sketch.boom_lines(drawing)
-    for boom, place in (("left", 3.0), ("right", -3.0)):
-        root = turned(drawing.quaternions["bus"], np.array([place, 0.0, 0.0]))
-        for line in lines[boom]:
-            np.testing.assert_allclose(line[:, 0], root, atol=1e-12)
 
 
 # -- parts of a flight -----------------------------------------------------------------------------
@@ -216,17 +113,118 @@ def test_no_key_covers_a_curve(page):
         assert [axes.get_legend() for axes in figure.axes] == [None] * len(figure.axes)
 
 
-def test_titles_stay_within_the_page_and_off_each_other(page):
-    for flight in (flown(*PLANAR), flown(*TUMBLING), flown(*RIGID), arm(), body()):
-        figure, _ = page(flight)
-        found = [
-            t for axes in figure.axes for t in (axes.title, axes._left_title, axes._right_title)
-        ]
-        boxes = [t.get_window_extent() for t in [*found, *figure.texts] if t.get_text()]
-        assert max(box.x1 for box in boxes) <= figure.bbox.x1
-        for k, one in enumerate(boxes):
-            for other in boxes[k + 1 :]:
-                assert not one.overlaps(other)
+def texts(figure):
+    """All that is written on a page, with the boxes that it takes."""
+    found = [*figure.texts]
+    for axes in figure.axes:
+        found += [axes.title, axes._left_title, axes._right_title, *axes.texts]
+        found += axes.get_legend().get_texts() if axes.get_legend() else []
+        for axis in (axes.xaxis, axes.yaxis) if axes.axison else ():
+            low, high = sorted(axis.get_view_interval())
+            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            found += [tick.label1 for tick in ticks if low <= tick.get_loc() <= high]
+            found.append(axis.get_offset_text())
+    return [(x.get_text(), box) for x in found if (box := x.get_window_extent()).width > 0]
+
+
+def coasting():
+    """A flight whose rate differs from a round figure by very little."""
+    flight = flown(*PLANAR)
+    time = flight.measured.time
+    signals = {
+        **flight.measured.signals,
+        "quasi_rigid_rate_z": 0.02 + 1e-12 * np.sin(time),
+        "quasi_rigid_angle_z": 0.02 * time,
+    }
+    both = {name: replace(getattr(flight, name), signals=signals, time=time)
+            for name in ("measured", "predicted")}  # fmt: skip
+    return replace(flight, **both)
+
+
+@pytest.mark.parametrize(
+    "flight",
+    [lambda: flown(*PLANAR), lambda: flown(*TUMBLING), lambda: flown(*RIGID), arm, body, coasting],
+    ids=["planar", "tumbling", "rigid", "arm", "body", "coasting"],
+)
+def test_all_that_is_written_stays_on_the_page_and_off_each_other(flight, page):
+    figure, _ = page(flight())
+    found = texts(figure)
+    assert len(found) > 80
+    for k, (words, box) in enumerate(found):
+        assert box.x0 >= 0, words
+        assert box.x1 <= figure.bbox.x1, words
+        for others, other in found[k + 1 :]:
+            assert not box.overlaps(other), (words, others)
+
+
+@pytest.mark.parametrize(
+    ("values", "base"),
+    [
+        ([0.7, 0.70005], 0.7),
+        ([0.70012, 0.70005], 0.7001),
+        ([0.7, 0.71], 0.0),  # it can be read as it is
+        ([-1e-6, 1e-6], 0.0),
+        ([0.0], 0.0),
+        ([], 0.0),
+        ([-0.7], -0.7),
+    ],
+)
+def test_what_differs_little_is_measured_from_a_round_number(values, base):
+    found = plots._base([np.array([value]) for value in values])
+    assert found == pytest.approx(base, abs=1e-12)
+
+
+def test_the_curves_of_a_panel_differ_in_colour():
+    assert len(set(plots_smooth.COLORS)) == len(plots_smooth.COLORS) >= 9
+
+
+@pytest.mark.parametrize(
+    ("now", "words"),
+    [
+        ({}, "thrust off"),
+        ({"a": 1.0}, "+1 N"),
+        ({"a": 0.75512, "b": -2.0}, "+0.755, -2 N"),
+        ({"a": 1.0, "c": -2.0}, "+1 N, -2 N m"),
+        ({"a": 1.0, "b": 1.0, "c": 1.0}, "3 of 4 channels on"),
+    ],
+)
+def test_thrust_is_told_in_few_words(now, words):
+    assert plots_film._thrust(now, {"a": "N", "b": "N", "c": "N m", "d": "N"}) == words
+
+
+def test_a_torque_that_has_faded_is_drawn_as_off(page):
+    flight = body()
+    faded = {
+        name: value * (np.exp(-50 * flight.measured.time) if name.startswith("torque") else 1.0)
+        for name, value in flight.measured.signals.items()
+    }
+    figure, _ = page(replace(flight, measured=replace(flight.measured, signals=faded)))
+    told = [axes.get_title(loc="right") for axes in figure.axes]
+    strip = [words for words in told if "on" in words or "off" in words]
+    assert strip[0] == "3 of 3 channels on"
+    assert strip[-1] == "thrust off"  # e^-50 of it is left
+
+
+@pytest.mark.parametrize(
+    ("peak", "scale", "letter"),
+    [(2.0, 1.0, ""), (0.5, 1.0, ""), (0.4, 1e-3, "m"), (3e-12, 1e-12, "p"), (1e-15, 1e-15, "f"),
+     (0.0, 1.0, "")],
+)  # fmt: skip
+def test_a_prefix_brings_the_peak_above_a_half(peak, scale, letter):
+    assert plots.prefix(peak) == (scale, letter)
+
+
+@pytest.mark.parametrize("length", [10, 60, 88, 200])
+def test_a_long_claim_is_written_smaller_before_it_is_cut(length, page):
+    flight = flown(*PLANAR)
+    claim = ("an average claim " * 20)[:length]
+    verdicts = tuple(replace(v, claim=claim) for v in flight.comparison.verdicts)
+    own = replace(flight, comparison=replace(flight.comparison, verdicts=verdicts))
+    figure, _ = page(own)
+    found = [x for axes in figure.axes for x in axes.texts if x.get_text().startswith("an av")]
+    assert found
+    assert {x.get_text().endswith("…") for x in found} == {length == 200}
+    assert (found[0].get_fontsize() < 9) == (length > 80)
 
 
 def test_a_tumbling_machine_is_drawn_isometrically(page):
@@ -273,12 +271,13 @@ def test_commands_too_dense_to_draw_are_said_to_be(page):
 
 
 def test_arms_and_bodies_show_places_rates_and_torques(page):
-    for flight, places, unit in ((arm(), "Joint angles", ", rad"), (body(), "Directions", "")):
+    unit_vectors = "Directions, of unit vectors"
+    for flight, places in ((arm(), "Joint angles, rad"), (body(), unit_vectors)):
         figure, _ = page(flight)
         found = titles(figure)
-        assert sum(title.startswith(places + unit) for title in found) == 2
-        for heading in ("Rates", "Torques", "MuJoCo minus reduced"):
-            assert sum(title.startswith(heading) for title in found) == 2
+        for heading in (places, "Rates", "Torques", "MuJoCo minus reduced"):
+            # Once: the figures of the law stand where others have the end of the flight.
+            assert sum(title.startswith(heading) for title in found) == 1
         assert not any("Thrust" in title or "Phase plane" in title for title in found)
 
 
