@@ -70,6 +70,7 @@ ONLY_IN = {
         "plots_film",
         "plots_law",
         "plots_smooth",
+        "plots_table",
         "plots_pair",
         "plots_certificate",
     },
