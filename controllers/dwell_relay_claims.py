@@ -16,7 +16,7 @@ from spacecraft_sim.trajectory import Trajectory, peak
 
 Array = np.ndarray
 
-SOURCE = "Sokolov 2004, (27), with a contour after Ivanova & Sokolov 1999"
+SOURCE = "Sokolov 2004, (27), and Ivanova & Sokolov 1999"
 SLACK = 1e-7  # share of the contour by which a switching may miss its arc
 ROUNDING = 1e-6  # share of the bound that this and the plant's integration may add
 _STEP = 0.02  # share of the dwell that motion is averaged over, to tell what disturbed it
@@ -49,14 +49,18 @@ class Claims:
     assumptions: tuple[Assumption, ...]
 
     def all(self) -> tuple[Guarantee, ...]:
-        """Returns every claim."""
+        """Returns every claim; that of the angle has a term for each of its causes.
+
+        The contour p0 u0 dwell^2; switching late, by sampling and delay; the other axes; and how
+        far the attitude may be from the angle that is fed back.
+        """
         terms = self.band.accuracy
         attitude = (f"attitude_{self.axis}", f"rate_{self.axis}")
-        words = f"|{attitude[0]}| <= p0 u0 dwell^2 = {terms.contour:.4g}"
+        words = f"|{attitude[0]}| <= contour {terms.contour:.3g}"
         for text, value in (
-            ("late switching", terms.sampling),
-            ("other axes", terms.coupling),
-            ("sup |H q|/J", terms.lean),
+            ("late", terms.sampling),
+            ("axes", terms.coupling),
+            ("H q/J", terms.lean),
         ):
             words += f" + {text} {value:.2g}" if value else ""
         return (
