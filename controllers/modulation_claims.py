@@ -7,9 +7,12 @@ Two rules say how large they are, U the level, k and J the least stiffness and m
   an angle of some U t_min/(T k) is left under PWM, and U U_on/(K_m k) under PWPF.
 - The least pulse changes the rate by U t_min/J; a limit cycle has about that rate.
 
-They are of one axis at rest and no theorems: a body in a slow limit cycle coasts a little beyond.
-Flights of Burkov's law (5.8) came within 35 % of the first and 17 % of the second; that much is
-granted here.  That no pulse is shorter than the minimum on-time is certain.
+They are of one axis at rest and no theorems: a body in a slow limit cycle coasts a little beyond,
+and pulses about several axes may fall together.  A reference of Burkov's law (5.8) came within 35 %
+of the first and 17 % of the second, and that much is granted here; of 64 flights of three minutes
+from random slews of 1.2 rad, 63 kept to the first, and to the second 32 of 32 of a rigid body and
+27 of 32 of a hub with booms, which swing along.  That no pulse is shorter than the minimum on-time
+is certain.
 """
 
 import math

@@ -86,7 +86,7 @@ def settle(mission: Any) -> Settled:
     if law.formula.command(t, y, still) != law.formula.command(t + 0.1, y, still):
         raise ValueError(
             f"{mission.scenario.name}: not settled, the law follows a motion; make its programme "
-            "constant: controller.programme.amplitude=[0.0, ..]"
+            f"constant: controller.programme.amplitude={[0.0] * len(law.sensors)}"
         )
     dynamics = compiled_dynamics.dynamics_at(physics, law.thrusters)
     dynamics = replace(dynamics, qvel=compiled_dynamics.steady_spin(dynamics))

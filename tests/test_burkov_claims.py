@@ -218,6 +218,20 @@ def test_rows_between_samples_do_not_count():
     assert one.filtered[0] == pytest.approx([0.0, 0.0])
 
 
+def test_of_several_rows_at_a_sample_the_last_counts():
+    law, claims = cases.position(period=0.01)
+    (run,) = fly(ARM, law, starts=np.zeros(4), duration=0.1)
+    # Rows a hair before each sample, as an edge there leaves them: torque of the sample before.
+    stale = {k: np.repeat(x, 2)[1:] for k, x in run.signals.items()}
+    for name in (*law.thrusters, *(f"{name}_command" for name in law.thrusters)):
+        stale[name] = np.repeat(run[name], 2)[:-1]
+    time = np.sort(np.r_[run.time, run.time[1:] - 1e-10])
+    twice = dataclasses.replace(run, time=time, signals=stale)
+    one, two_ = (samples(law, x, ("joint_1_rate",)) for x in (run, twice))
+    assert all(np.array_equal(a, b) for a, b in zip(one, two_, strict=True))
+    assert claims[0].check(twice).holds == claims[0].check(run).holds
+
+
 def test_a_flight_too_short_to_judge_is_not_a_number():
     law, (falls, *_) = cases.position()
     (run,) = fly(ARM, law, starts=np.zeros(4), duration=0.005)
