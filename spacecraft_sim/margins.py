@@ -89,7 +89,9 @@ def settle(mission: Any) -> Settled:
             f"constant: controller.programme.amplitude={[0.0] * len(law.sensors)}"
         )
     dynamics = compiled_dynamics.dynamics_at(physics, law.thrusters)
-    dynamics = replace(dynamics, qvel=compiled_dynamics.steady_spin(dynamics))
+    # Only a law that points one axis leaves a spin; what others have is the rest of a swing.
+    spin = compiled_dynamics.steady_spin(dynamics) * _points_one_axis(law)
+    dynamics = replace(dynamics, qvel=spin)
     N = compiled_dynamics.basis(dynamics.model, without=_unseen(physics, law))
     dynamics, torques = _rest(dynamics, law, N, t)
     try:
@@ -355,9 +357,13 @@ def _readings(settled: Settled, motion: compiled_dynamics.CompiledDynamics) -> l
     return [readings[name] for name in settled.law.sensors]
 
 
+def _points_one_axis(law: Any) -> bool:
+    return "s1_y" in law.sensors
+
+
 def _unseen(physics: Any, law: Any) -> tuple[int, ...]:
     """The roll about s1, and its rate, where a law reads or drives neither."""
-    if "s1_y" not in law.sensors:
+    if not _points_one_axis(law):
         return ()
     first = physics.model.ptr.nv - 3
     both = "torque_x" not in law.thrusters

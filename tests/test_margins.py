@@ -50,8 +50,10 @@ def test_linear_margins_of_the_compiled_machine_are_the_reference_figures(name):
     assert slowest == pytest.approx(DECAY[name], abs=5e-3)  # the shortest has two decimals
 
 
-FLOWN = ("burkov-position", "burkov-position-7r", "burkov-flexible-joint", "burkov-body-vectors-free",
-         "burkov-permanent-rotation", "burkov-two-torques", "burkov-hub-two-booms")  # fmt: skip
+FLOWN = (
+    "burkov-position", "burkov-position-7r", "burkov-flexible-joint", "burkov-body-vectors-free",
+    "burkov-permanent-rotation", "burkov-two-torques", "burkov-hub-two-booms",
+)  # fmt: skip
 
 
 @pytest.mark.slow
@@ -71,10 +73,10 @@ def test_seven_links_bear_little_delay():
     ready = mission.assemble(mission.load_scenario("burkov-position-7r"))
     settled = margins.settle(ready)
     found = {m.name: 1e3 * m.linear for m in margins.margins(settled, flown=False)}
-    assert max(x.real for x in settled.loop.eigenvalues().tolist()) == pytest.approx(-5.0, rel=0.05)
+    assert max(x.real for x in settled.loop.eigenvalues().tolist()) == pytest.approx(-4.32, abs=5e-3)
     assert found["delay"] == pytest.approx(1.3, rel=0.1)
     assert found["sampling period, first-order hold"] == pytest.approx(2.6, rel=0.1)
-    assert ready.controller.period < 1e-3 * min(found.values())
+    assert ready.scenario.controller.get("period", 1e-3) < 1e-3 * min(found.values())
 
 
 def test_what_is_left_of_a_swing_is_no_spin():
