@@ -8,7 +8,7 @@ minimum on-time t_min.  With r = u/U:
 - Pulse width and frequency (PWPF).  A lag T_m f' = K_m (r - s) - f, s = -1, 0 or 1 for the thrust
   that flows, and a Schmitt trigger on f: s switches on at |f| = U_on, off at U_off, and not
   before t_min.  At rest f = K_m r, so |r| < U_on/K_m goes unanswered.  The lag is carried from
-  sample to sample exactly, its input held.
+  sample to sample exactly, with r as it is at the later one.
 
 What goes unanswered is the modulator's dead band, t_min/T or U_on/K_m of the level.
 
@@ -38,7 +38,7 @@ class Channel(NamedTuple):
 
     Attributes:
         sign: Of the thrust; 0 if it is off.
-        since: When it took that sign, s.
+        since: When that was decided, s.
         end: When the pulse ends if it does before the next sample, s; inf if not.
         lag: Output of the lag; 0 where there is none.
     """
@@ -134,8 +134,8 @@ class PulseWidthPulseFrequency:
 
         Args:
             t: Time of the sample, s.
-            r: Torque asked for, over the level, until the next sample.
-            before: State before the sample.
+            r: Torque asked for, over the level; taken for that of the period which ends here.
+            before: State before the sample, with the thrust of that period.
         """
         s, since = before.sign, before.since
         goal = self.gain * (r - s)
