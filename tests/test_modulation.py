@@ -179,7 +179,9 @@ def test_no_pulse_is_shorter_than_the_minimum_on_time(r, least, kind):
 # -- a law of Burkov -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["burkov-pwm", "burkov-pwpf"])
+@pytest.mark.parametrize(
+    "name", ["burkov-pwm", pytest.param("burkov-pwpf", marks=pytest.mark.slow)]
+)
 def test_relay_thrusters_settle_into_the_dead_band_on_both_plants(name):
     ready = mission.assemble(mission.load_scenario(name, ("duration=100.0",)))
     measured, predicted = ready.fly(), ready.fly("reduced")
