@@ -7,13 +7,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from controllers.burkov_claims import sample_rows
 from controllers.burkov_laws import BodyVectors, BodyVectorsAndRates, Path
 from controllers.burkov_lyapunov import basin
 from controllers.gains import Numbers
 from controllers.velocity_filter import Memory, SampledLaw, VelocityFilter
 from spacecraft_sim.chart import Arrow, Charts, Curve, History, Measured, Sphere
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, sample_rows
 
 Array = np.ndarray
 Vector = Sequence[float] | Array

@@ -15,7 +15,7 @@ import numpy as np
 from controllers.velocity_filter import SampledLaw
 from spacecraft_sim.guarantee import Assumption, Guarantee, Measurement
 from spacecraft_sim.loop_margins import Loop
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, sample_rows
 
 Array = np.ndarray
 Vector = Sequence[float] | Array
@@ -69,18 +69,6 @@ def samples(law: SampledLaw, trajectory: Trajectory, moving: Sequence[str]) -> S
         memory = law.filter.step(law.formula.filtered(t, y), memory)
         filtered.append(memory.w)
     return Samples(time, readings, np.array(filtered), columns(law.thrusters), columns(moving))
-
-
-def sample_rows(time: Array, period: float) -> tuple[Array, Array]:
-    """Returns the rows of a flight that are at samples, and the numbers of these samples.
-
-    Args:
-        time: Times of the rows, shape (n,), s.
-        period: Sampling period, s.
-    """
-    count = time / period
-    at = np.flatnonzero(np.abs(count - np.round(count)) < 1e-6)
-    return at, np.round(count[at]).astype(int)
 
 
 class Start(NamedTuple):

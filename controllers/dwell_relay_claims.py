@@ -12,7 +12,7 @@ import numpy as np
 from spacecraft_sim.dwell_axes import Band
 from spacecraft_sim.guarantee import Assumption, Guarantee, Measurement
 from spacecraft_sim.small_motion import slow_rotation, small_deflection
-from spacecraft_sim.trajectory import Trajectory, peak
+from spacecraft_sim.trajectory import Trajectory, peak, sample_rows
 
 Array = np.ndarray
 
@@ -172,11 +172,7 @@ class Claims:
 
     def _samples(self, time: Array) -> Array:
         """Rows between which a mean may be taken: between samples an estimate does not follow."""
-        if self.period is None:
-            return np.arange(len(time))
-        phase = time / self.period
-        last = np.diff(time, append=math.inf) > 1e-9 * self.period
-        return np.flatnonzero(last & (np.abs(phase - np.round(phase)) < 1e-6))
+        return np.arange(len(time)) if self.period is None else sample_rows(time, self.period)[0]
 
     def _slip(self, track: Trajectory, row: int) -> float:
         """Largest |(phi x omega)/2| about the axis, the kinematics of three axes."""

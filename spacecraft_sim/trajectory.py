@@ -128,6 +128,22 @@ def selected(trajectory: Trajectory, rows: Any) -> Trajectory:
     return replace(trajectory, time=trajectory.time[rows], signals=signals)
 
 
+def sample_rows(time: Array, period: float) -> tuple[Array, Array]:
+    """Returns the rows of a flight that are at samples, and the numbers of these samples.
+
+    Of several rows at one instant the last counts: it has what the sample decided.
+
+    Args:
+        time: Times of the rows, shape (n,), s.
+        period: Sampling period, s.
+    """
+    count = time / period
+    number = np.round(count)
+    rows = np.flatnonzero(np.abs(count - number) < 1e-6)
+    rows = rows[np.diff(number[rows], append=np.inf) > 0]
+    return rows, number[rows].astype(int)
+
+
 def peak(time: Array, value: Array, rate: Array) -> tuple[float, float]:
     """Finds the largest |value| of a sampled signal with known rates, between the samples too.
 

@@ -14,6 +14,7 @@ from spacecraft_sim import mission
 from spacecraft_sim.dwell_accuracy import guaranteed_accuracy
 from spacecraft_sim.elastic_influence import influence
 from spacecraft_sim.scenario import Scenario
+from spacecraft_sim.trajectory import sample_rows
 
 slow = pytest.mark.slow
 
@@ -138,9 +139,8 @@ def test_the_estimate_follows_the_quasi_rigid_angle_from_the_attitude_alone():
     ready = assembled("sokolov-estimated", "duration=150.0")
     assert ready.controller.sensors == ("attitude_x", "attitude_y", "attitude_z")
     track = ready.fly()
-    time = track.time
-    rows = np.abs(time / 0.05 - np.round(time / 0.05)) < 1e-6
-    rows &= (time > 100) & (np.diff(time, append=np.inf) > 1e-9)
+    rows, _ = sample_rows(track.time, 0.05)
+    rows = rows[track.time[rows] > 100]
     for axis in "xyz":
         true = track[f"quasi_rigid_angle_{axis}"][rows]
         error = np.abs(track[f"estimated_quasi_rigid_angle_{axis}"][rows] - true).max()
@@ -161,9 +161,7 @@ def test_commands_between_samples_are_foretold():
     # A delay that is no multiple of the period; the start is at rest: the estimate is exact.
     late = "thrusters.all.delay=0.13", "duration=60.0"
     track = assembled("sokolov-estimated", *late).fly("reduced")
-    time = track.time
-    rows = np.abs(time / 0.05 - np.round(time / 0.05)) < 1e-6
-    rows &= np.diff(time, append=np.inf) > 1e-9
+    rows, _ = sample_rows(track.time, 0.05)
     for axis in "xyz":
         true = track[f"quasi_rigid_angle_{axis}"][rows]
         assert np.abs(true).max() > 1e-5

@@ -73,7 +73,9 @@ def test_seven_links_bear_little_delay():
     ready = mission.assemble(mission.load_scenario("burkov-position-7r"))
     settled = margins.settle(ready)
     found = {m.name: 1e3 * m.linear for m in margins.margins(settled, flown=False)}
-    assert max(x.real for x in settled.loop.eigenvalues().tolist()) == pytest.approx(-4.32, abs=5e-3)
+    assert max(x.real for x in settled.loop.eigenvalues().tolist()) == pytest.approx(
+        -4.32, abs=5e-3
+    )
     assert found["delay"] == pytest.approx(1.3, rel=0.1)
     assert found["sampling period, first-order hold"] == pytest.approx(2.6, rel=0.1)
     assert ready.scenario.controller.get("period", 1e-3) < 1e-3 * min(found.values())
