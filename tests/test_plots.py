@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import FancyArrowPatch
 
-from spacecraft_sim import plots, plots_chart, plots_film, plots_law, plots_smooth, spans
+from spacecraft_sim import plots, plots_chart, plots_film, plots_law, plots_smooth, spans, sphere
 from spacecraft_sim.chart import charts_of, vectors
 from spacecraft_sim.families import families, is_quasi_rigid
 from spacecraft_sim.trajectory import Trajectory
@@ -279,6 +279,47 @@ def test_arms_and_bodies_show_places_rates_and_torques(page):
             # Once: the figures of the law stand where others have the end of the flight.
             assert sum(title.startswith(heading) for title in found) == 1
         assert not any("Thrust" in title or "Phase plane" in title for title in found)
+
+
+def test_what_a_law_computes_is_drawn_on_a_logarithmic_axis_and_a_sphere(page):
+    figure, _ = page(body())
+    by_title = {axes.get_title(loc="left"): axes for axes in figure.axes}
+    energy = by_title["V and its terms, J"]
+    assert energy.get_yscale() == "log"
+    names = [text.get_text() for text in energy.get_legend().get_texts()]
+    assert names == ["V", "kinetic", "potential of the law", "filter"]
+    globe = by_title["s2, s3 on the unit sphere"]
+    points = np.vstack([line.get_xydata() for line in globe.lines])
+    reach = np.nanmax(np.hypot(*points.T))
+    assert reach == pytest.approx(1.0, abs=1e-3)  # the rim, of which some points are drawn
+    stars = [line for line in globe.lines if line.get_marker() == "*" and len(line.get_xydata())]
+    law = body().mission.controller
+    view = sphere.view(next(c for c in law.charts if c.name == "vectors"))
+    places = np.array([star.get_xydata()[0] for star in stars])
+    np.testing.assert_allclose(places, view.project(np.array(law.formula.r)), atol=1e-12)
+
+
+def test_pictures_of_a_machine_without_booms_lie_evenly_along_its_way():
+    flight = arm()
+    frames = plots_film._frames(flight.drawing, flight.measured, 6)
+    assert frames[0] == 0
+    assert frames[-1] == len(flight.drawing.time) - 1
+    assert frames == sorted(frames)
+    # One joint's share is the share of the whole way where the other hardly moves.
+    turns = [
+        np.linalg.norm(np.diff(q, axis=0), axis=1) for q in flight.drawing.quaternions.values()
+    ]
+    way = np.cumsum(np.sum(turns, axis=0))
+    steps = np.diff(np.r_[0.0, way[np.array(frames[1:-1]) - 1]]) / way[-1]
+    np.testing.assert_allclose(steps, 0.98 / 4, atol=0.03)  # a frame is some hundredths of the way
+
+
+def test_a_decay_is_over_once_it_is_within_a_fiftieth():
+    time = np.linspace(0, 40, 40_001)
+    signals = {"x": np.exp(-time), "still": 1e-5 * np.sin(time)}
+    flight = Trajectory(time=time, signals=signals, units={"x": "", "still": ""})
+    # exp(-t) = 1/50; a third longer is 1.35 of it; rows are a millisecond apart.
+    assert spans.transient(flight, ["x", "still"]) == pytest.approx(1.35 * np.log(50), abs=3e-3)
 
 
 def test_families_name_the_signals_once():
