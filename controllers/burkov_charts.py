@@ -96,7 +96,7 @@ class AtSamples:
                 rows.append(row)
                 found.append(self.values(t, y, state, z))
         after = int(numbers[-1]) if len(numbers) else last
-        values = np.array(found, dtype=float).reshape(len(rows), -1)
+        values = np.array(found, dtype=float) if found else np.zeros((0, 0))
         return Measured(np.array(rows, dtype=int), values, (after, state))
 
 

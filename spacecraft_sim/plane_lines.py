@@ -10,6 +10,7 @@ LETTER, HEIGHT = 0.075, 0.24  # of a letter's width and a name's height, in half
 BELOW = 0.15  # from the place of a name to its middle: the viewer writes below it
 WINDOW = (1.0, 0.95)  # within which names stand, half width and half height
 EDGE = 1.08  # within which they are whole
+LEAST = 0.4  # of a line that gets a name, likewise
 PLACES = 60  # on each line that are tried
 
 
@@ -23,13 +24,14 @@ def spread(lines: Sequence[Array], names: Sequence[str]) -> list[Array | None]:
         names: The names.
 
     Returns:
-        The places, each of shape (2,); None for a line of which nothing is visible.
+        The places, each of shape (2,); None for a line of which nothing is visible, or so little
+        that its name would cover it.
     """
     found: list[Array | None] = [None] * len(lines)
     boxes: list[tuple[Array, Array]] = []  # middle and half size of each name that stands
     for k in sorted(range(len(lines)), key=lambda k: len(lines[k])):
         seen = lines[k][np.all(np.abs(lines[k]) <= WINDOW, axis=1)]
-        if not len(seen):
+        if not len(seen) or np.ptp(seen, axis=0).max() < LEAST:
             continue
         places = seen[np.unique(np.linspace(0, len(seen) - 1, PLACES).astype(int))]
         half = np.array([len(names[k]) * LETTER, HEIGHT]) / 2

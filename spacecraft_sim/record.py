@@ -311,6 +311,7 @@ class Recording:
             groups=self._plots,
             bands=self._bands,
             relays=any(not channel.thruster.proportional for channel in self._channels),
+            acting=self._acting(),
             duration=max(self._ends.values()),
             active=self._active(),
             booms=bool(self._rest.booms),
@@ -325,6 +326,13 @@ class Recording:
             aside.send_blueprint(blueprint(layout, following=True))
             aside.flush(timeout_sec=self._patience)
             aside.disconnect()
+
+    def _acting(self) -> list[str]:
+        """Channels that act in a flight that is known; all if none does."""
+        names = list(dict.fromkeys(c.name for c in (*self._channels, *self._beneath.channels)))
+        known = self._beneath.known
+        acting = [n for n in names if any(np.any(f.signals.get(n, 0.0)) for f in known)]
+        return acting or names
 
     def _active(self) -> float | None:
         """Until when there is something to see of a machine that comes to rest, s."""

@@ -42,6 +42,7 @@ class Layout:
         spheres: Where it draws directions.
         bands: Half-widths that signals are to keep, by signal, the widest first, rad.
         relays: Whether there are channels with levels.
+        acting: Names of the channels whose thrust is shown: those that are known to act.
         upright: Whether the machine stands on the ground, to be seen from the side.
     """
 
@@ -61,6 +62,7 @@ class Layout:
     spheres: Sequence[Sphere]
     bands: Mapping[str, float]
     relays: bool
+    acting: Sequence[str]
     upright: bool
 
 
@@ -127,11 +129,12 @@ def _plot(
     until: float | None = None,
     half: float | None = None,
     bounds: Sequence[str] = (),
+    parts: Sequence[str] = ("**",),
 ) -> rrb.TimeSeriesView:
     """A plot of the whole flight, or near the cursor."""
     return rrb.TimeSeriesView(
         origin=origin,
-        contents=["+ $origin/**", *(f"+ /{path}" for path in bounds)],
+        contents=[*(f"+ $origin/{part}" for part in parts), *(f"+ /{path}" for path in bounds)],
         name=name,
         axis_x=_time(near, until),
         axis_y=rrb.ScalarAxis(range=(-half, half)) if half else None,
@@ -156,15 +159,18 @@ def _histories(layout: Layout) -> rrb.Vertical:
     return rrb.Vertical(*rows)
 
 
-def _spans(parts: Sequence[tuple[str, str, str]], layout: Layout) -> list[rrb.TimeSeriesView]:
+def _spans(
+    plots: Sequence[tuple[str, str, str]], layout: Layout, parts: Sequence[str] = ("**",)
+) -> list[rrb.TimeSeriesView]:
     """Plots of the whole flight; before them, of one that comes to rest, plots of its beginning."""
-    whole = [_plot(origin, f"{title} [{unit or '-'}]") for origin, title, unit in parts]
+    titles = [(origin, f"{title} [{unit or '-'}]") for origin, title, unit in plots]
+    whole = [_plot(origin, title, parts=parts) for origin, title in titles]
     if not layout.active:
         return whole
     words = f"first {layout.active:.3g} s"
     first = [
-        _plot(origin, f"{title} [{unit or '-'}], {words}", until=layout.active)
-        for origin, title, unit in parts
+        _plot(origin, f"{title}, {words}", until=layout.active, parts=parts)
+        for origin, title in titles
     ]
     return [*first, *whole]
 
@@ -190,16 +196,20 @@ def _near_and_planes(layout: Layout, following: bool) -> rrb.Vertical:
     found = (spheres, energies, [*firsts, *map_views(layout.charts)], others)
     upper = [rrb.Tabs(*views) for views in found if views]
     near = min(NEAR, layout.duration / 10)
+    channels = [f"{name}/**" for name in layout.acting]
     thrust = [
-        _plot("thrust", "Thrust near the cursor [N or N m]", near=near),
-        *_spans([("thrust", "Thrust", "N or N m")], layout),
+        _plot("thrust", "Thrust near the cursor [N or N m]", near=near, parts=channels),
+        *_spans([("thrust", "Thrust", "N or N m")], layout, channels),
     ]
     # Pulses are seen from near, a torque that follows its command from afar.
     thrust = thrust if layout.relays else [*thrust[1:], thrust[0]]
     rows: list[rrb.Container | rrb.View] = [*upper, rrb.Tabs(*thrust)]
     if layout.relays:
         lanes = rrb.StateTimelineView(
-            origin="relay", name="Relay near the cursor", time_view=_time(near)
+            origin="relay",
+            contents=[f"+ $origin/{part}" for part in channels],
+            name="Relay near the cursor",
+            time_view=_time(near),
         )
         rows.append(lanes)
     return rrb.Vertical(*rows, row_shares=[3] * len(upper) + [2, 1.5][: len(rows) - len(upper)])
