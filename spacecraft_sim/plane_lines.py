@@ -10,7 +10,7 @@ LETTER, HEIGHT = 0.075, 0.24  # of a letter's width and a name's height, in half
 BELOW = 0.15  # from the place of a name to its middle: the viewer writes below it
 WINDOW = (1.0, 0.95)  # within which names stand, half width and half height
 EDGE = 1.08  # within which they are whole
-LEAST = 0.4  # of a line that gets a name, likewise
+LEAST = 0.9  # of a line that gets a name, likewise
 PLACES = 60  # on each line that are tried
 
 

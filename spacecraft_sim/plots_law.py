@@ -50,7 +50,8 @@ def _history(history: History) -> Panel:
         for curve, value in zip(history.curves, shown(values).T, strict=True):
             color = INK if curve.hue is None else BOOMS[curve.hue % len(BOOMS)]
             width, alpha = (4.0, 0.35) if curve.beneath else (1.2, 1.0)
-            look = {"color": color, "linewidth": width, "alpha": alpha}
+            order = 2.0 if curve.hue is not None else 3.0  # what it is about lies on top
+            look = {"color": color, "linewidth": width, "alpha": alpha, "zorder": order}
             axes.plot(time, value, label=None if curve.beneath else curve.name, **look)
         if history.decades:
             axes.set_yscale("log")

@@ -55,7 +55,7 @@ def ruler(stream: Stream, rest: Drawing, middle: Array, radius: float, upright: 
     length = max(m for m in RULERS if m <= radius or m == RULERS[0])
     wide = max((np.max(np.abs(s.position)) + np.max(s.size) for s in rest.shapes), default=0.0)
     aside = min(0.55 * radius + 0.3 * wide, 1.1 * radius)
-    away = np.array([0.0, 0.0, -radius] if upright else [0.0, -aside, 0.0])
+    away = np.array([0.0, 0.0, -1.12 * radius] if upright else [0.0, -aside, 0.0])
     ends = [middle + away + (x, 0.0, 0.0) for x in (-length / 2, length / 2)]
     line = rr.LineStrips3D([ends], labels=[f"{length:g} m"], colors=GREY, radii=-1.0)
     stream.log("world/ruler", line, static=True)
