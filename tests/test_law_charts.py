@@ -9,6 +9,7 @@ import pytest
 import rrd
 from flown import flown
 from scipy.signal import lfilter
+from test_report import figures
 
 from spacecraft_sim import beneath, record, record_law, run_folder, sphere
 from spacecraft_sim.chart import charts_of, floor, histories, path_of, series, spheres
@@ -207,7 +208,26 @@ def test_a_sphere_is_seen_with_its_goals_in_front():
     assert not np.any(np.isnan(front) & np.isnan(back))
 
 
-# -- in a recording --------------------------------------------------------------------------------
+# -- in a report and in a recording ----------------------------------------------------------------
+
+
+def test_histories_and_spheres_of_a_law_are_there():
+    flight = flown("duration=1.0", name="burkov-body-vectors")
+    found, column = figures(flight)
+    energy = found["chart_energy"]
+    assert energy["log"]
+    names = ["V, reduced", "V", "kinetic", "potential of the law", "filter"]
+    assert [t["name"] for t in energy["traces"]] == names
+    total, *terms = (10 ** column(t["y"]).astype(float) for t in energy["traces"][1:])
+    # Logarithms in single precision: 1e-7 of some ten, times ln 10; terms are cut off at 1e-12 V.
+    np.testing.assert_allclose(total, np.sum(terms, axis=0), rtol=1e-5)
+    globe = found["chart_vectors"]
+    tracks = [t for t in globe["tracks"] if t["name"] == "s2, MuJoCo"]
+    x = np.stack([column(t["x"]) for t in tracks])
+    assert np.all(np.isfinite(x).any(axis=0))  # at each instant in front or at the back
+    radius = np.hypot(*(np.concatenate([column(t[c]) for t in tracks]) for c in "xy"))
+    assert np.nanmax(radius) <= 1 + 1e-6
+    assert [p["name"] for p in globe["points"]] == ["goal of s2", "goal of s3"]
 
 
 @pytest.fixture(scope="module", params=[ARM, BODY])
