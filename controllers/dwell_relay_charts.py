@@ -74,8 +74,7 @@ def _map(band: Band, name: str) -> Map:
     F, e = abs(band.axis.bias), band.axis.disturbance
     return Map(
         name=f"dwell_relay_accuracy_{name}",
-        title=f"Guaranteed accuracy about {name}: p0 u0 dwell^2, here p0 = "
-        f"{guaranteed_accuracy(F, e):.4g}",
+        title=f"Guaranteed about {name}: p0 u0 dwell^2, here p0 = {guaranteed_accuracy(F, e):.4g}",
         labels=(
             "F, constant disturbance over the thrust",
             "e, moment of the elastic parts over it",

@@ -152,4 +152,4 @@ def _map(axes: Axes, chart: Map) -> None:
     for line, dashes in zip(chart.lines, looks * len(chart.lines), strict=False):
         axes.plot(*line.points.T, color=INK, linewidth=1.2, linestyle=dashes, label=line.name)
     axes.plot(*chart.point, "*", color=BAD, markersize=15, label="here", zorder=9)
-    panel(axes, chart.title, *chart.labels)
+    panel(axes, chart.title, *chart.labels, below=True)
