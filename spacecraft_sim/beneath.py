@@ -8,7 +8,7 @@ import numpy as np
 
 from spacecraft_sim.changes import Channel
 from spacecraft_sim.chart import Charts
-from spacecraft_sim.drawing import Drawing, channel_units
+from spacecraft_sim.drawing import Drawing, channel_units, sprung_joints
 from spacecraft_sim.frames import (
     Frames,
     at_rest,
@@ -90,7 +90,7 @@ def reduced(subject: Subject, flight: Trajectory, factor: float | None = None) -
     """
     machine, rest = subject.machine, at_rest(subject.model, subject.machine)
     if factor is None:
-        factor = suited_factor(flight, {boom.name: boom.length for boom in machine.booms})
+        factor = suited_factor(subject.model, machine, flight)
     bodies, joints = [], read_joints(subject.model, flight)
     if joints:
         bodies = drawn_bodies(rest)
@@ -125,18 +125,23 @@ def reduced(subject: Subject, flight: Trajectory, factor: float | None = None) -
         frames=frames,
         factor=factor,
         charts=subject.charts,
-        notes=tuple(note for note in (bent(machine, factor), words) if note),
+        notes=tuple(note for note in (bent(subject.model, machine, factor), words) if note),
     )
 
 
-def bent(machine: Spacecraft, factor: float) -> str:
-    """Returns what is to be said of how booms are drawn.
+def bent(model: Any, machine: Spacecraft, factor: float) -> str:
+    """Returns what is to be said of how elastic parts are drawn.
 
     Args:
+        model: The compiled spacecraft.
         machine: The machine.
         factor: How many times too far they are bent.
     """
-    return f"Booms are drawn bent {factor:g} times as far as they are." if machine.booms else ""
+    if machine.booms:
+        return f"Booms are drawn bent {factor:g} times as far as they are."
+    if sprung_joints(model, machine):
+        return f"Sprung joints are drawn turned {factor:g} times as far as they are."
+    return ""
 
 
 def channels(

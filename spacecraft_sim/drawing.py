@@ -67,6 +67,7 @@ class Drawing:
         quaternions: Body orientations (w, x, y, z) by body name, each of shape (n, 4).
         booms: Bodies of each boom from root to tip, by boom name.
         tips: Position of each boom's tip in its last body, by boom name, m.
+        turned: How many times too far sprung joints are turned.
     """
 
     shapes: tuple[Shape, ...]
@@ -76,10 +77,16 @@ class Drawing:
     quaternions: dict[str, Array]
     booms: dict[str, tuple[str, ...]]
     tips: dict[str, Array]
+    turned: float = 1.0
 
 
 def draw(
-    model: mujoco.MjModel, spacecraft: Spacecraft, trajectory: Trajectory, *, frames: int = 2000
+    model: mujoco.MjModel,
+    spacecraft: Spacecraft,
+    trajectory: Trajectory,
+    *,
+    frames: int = 2000,
+    turning: float = 1.0,
 ) -> Drawing:
     """Draws a flight from its recorded coordinates.
 
@@ -88,6 +95,7 @@ def draw(
         spacecraft: The machine.
         trajectory: A flight of the MuJoCo plant.
         frames: How many instants at most; the rows are thinned evenly.
+        turning: How many times too far sprung joints are turned.
 
     Returns:
         Shapes and motion.
@@ -95,6 +103,9 @@ def draw(
     rows = np.unique(np.linspace(0, len(trajectory.time) - 1, frames).astype(int))
     names = list(trajectory.signals)[-model.nq :]
     coordinates = np.column_stack([trajectory[name][rows] for name in names])
+    joints = sprung_joints(model, spacecraft)
+    if turning != 1.0:
+        _turn(model, joints, coordinates, turning)
     bodies = [model.body(b).name for b in range(1, model.nbody)]
     data = mujoco.MjData(model)
     positions, quaternions = np.zeros((2, len(rows), len(bodies), 4))
@@ -111,7 +122,57 @@ def draw(
         quaternions={name: quaternions[:, b] for b, name in enumerate(bodies)},
         booms={b.name: (f"{b.name}_0", *mjcf.hinge_names(b)) for b in spacecraft.booms},
         tips={b.name: model.site(f"{b.name}_tip").pos.copy() for b in spacecraft.booms},
+        turned=turning if joints else 1.0,
     )
+
+
+def sprung_joints(model: mujoco.MjModel, spacecraft: Spacecraft) -> list[int]:
+    """Returns the joints of the elastic parts of a free machine; none if it has booms, which bend.
+
+    Args:
+        model: The compiled spacecraft.
+        spacecraft: The machine.
+    """
+    free = model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
+    if spacecraft.booms or not free:
+        return []
+    return np.flatnonzero(model.jnt_stiffness > 0).tolist()
+
+
+def largest_turn(model: mujoco.MjModel, joints: list[int], trajectory: Trajectory) -> float:
+    """Returns how far the joint goes that goes farthest from where its spring is at rest, rad or m.
+
+    Args:
+        model: The compiled spacecraft.
+        joints: Joints.
+        trajectory: A flight with the machine's coordinates as its last signals.
+    """
+    names, largest = list(trajectory.signals)[-model.nq :], 0.0
+    for j in joints:
+        a, rest = model.jnt_qposadr[j], model.qpos_spring
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
+            q = np.column_stack([trajectory[name] for name in names[a : a + 4]])
+            largest = max(
+                largest, float(2 * np.arccos(np.clip(np.abs(q @ rest[a : a + 4]), 0, 1)).max())
+            )
+        else:
+            largest = max(largest, float(np.abs(trajectory[names[a]] - rest[a]).max()))
+    return largest
+
+
+def _turn(model: mujoco.MjModel, joints: list[int], coordinates: Array, factor: float) -> None:
+    """Moves joints away from where their springs are at rest, in place."""
+    rest = model.qpos_spring
+    for j in joints:
+        a = model.jnt_qposadr[j]
+        if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_BALL:
+            for q in coordinates[:, a : a + 4]:
+                velocity = np.zeros(3)
+                mujoco.mju_subQuat(velocity, q, rest[a : a + 4])
+                q[:] = rest[a : a + 4]
+                mujoco.mju_quatIntegrate(q, velocity, factor)
+        else:
+            coordinates[:, a] = rest[a] + factor * (coordinates[:, a] - rest[a])
 
 
 def boom_points(drawing: Drawing, boom: str) -> tuple[Array, Array]:

@@ -6,14 +6,23 @@ attitude, at the place of the other plant's bus, and each boom in the shape of t
 mode through its tip, which is exact for the Galerkin model of one mode.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spacecraft_sim import beam
-from spacecraft_sim.drawing import Drawing, boom_points, cross, draw, turned
+from spacecraft_sim.drawing import (
+    Drawing,
+    boom_points,
+    cross,
+    draw,
+    largest_turn,
+    sprung_joints,
+    turned,
+)
 from spacecraft_sim.mjcf import BUS
+from spacecraft_sim.readings import undeformed_mass_matrix
 from spacecraft_sim.spacecraft import Spacecraft
 from spacecraft_sim.trajectory import Trajectory, selected
 
@@ -95,9 +104,9 @@ def simulated(model, machine: Spacecraft, part: Trajectory, factor: float) -> Fr
         model: The compiled spacecraft.
         machine: The machine.
         part: The rows, with the machine's coordinates as their last signals.
-        factor: How many times too far the booms are bent.
+        factor: How many times too far booms are bent, or sprung joints turned.
     """
-    drawing = draw(model, machine, part, frames=len(part.time))
+    drawing = draw(model, machine, part, frames=len(part.time), turning=factor)
     booms = {}
     for boom in drawing.booms:
         points, straight = boom_points(drawing, boom)
@@ -184,21 +193,39 @@ def bus_alone(
     return Frames(time=part.time, positions={BUS: place}, quaternions={BUS: turn}, booms=booms)
 
 
-def suited_factor(flight: Trajectory, lengths: Mapping[str, float]) -> float:
-    """Returns a round factor that brings the largest tip deflection to a quarter of its boom.
+def suited_factor(model, machine: Spacecraft, flight: Trajectory) -> float:
+    """Returns a round factor that brings the largest bending to a quarter of a boom or a radian.
 
     Args:
-        flight: A flight with the tips of its booms.
-        lengths: Length of each boom, m.
+        model: The compiled spacecraft.
+        machine: The machine.
+        flight: A flight of either plant.
     """
-    if not lengths:
+    if joints := sprung_joints(model, machine):
+        largest = max(1e-4, _largest_turn(model, joints, flight))
+    elif machine.booms:
+        largest = 1e-4
+        for boom in machine.booms:
+            for axis in "yz":
+                tip = flight.signals.get(f"{boom.name}_tip_{axis}", np.zeros(1))
+                largest = max(largest, float(np.abs(tip).max()) / boom.length)
+    else:
         return 1.0
-    largest = 1e-4
-    for boom, length in lengths.items():
-        for axis in "yz":
-            tip = flight.signals.get(f"{boom}_tip_{axis}", np.zeros(1))
-            largest = max(largest, float(np.abs(tip).max()) / length)
     return max(f for f in FACTORS if f == 1 or f < 0.3 / largest)
+
+
+def _largest_turn(model, joints: list[int], flight: Trajectory) -> float:
+    """Recorded, or what one joint alone needs to lean the bus off the quasi-rigid angle so far."""
+    if any(name.startswith(f"{model.joint(joints[0]).name}.") for name in flight.signals):
+        return largest_turn(model, joints, flight)
+    M = undeformed_mass_matrix(model)
+    lean_of = np.abs(np.linalg.solve(M[:6, :6], M[:6, 6:])).max(axis=1)[3:]
+    turns = [0.0]
+    for axis, most in zip("xyz", lean_of, strict=True):
+        names = f"attitude_{axis}", f"quasi_rigid_angle_{axis}"
+        if all(name in flight.signals for name in names) and most > 0:
+            turns.append(float(np.abs(flight[names[0]] - flight[names[1]]).max()) / most)
+    return max(turns)
 
 
 def orientation(part: Trajectory) -> dict[str, Array]:

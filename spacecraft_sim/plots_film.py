@@ -65,6 +65,8 @@ def film(strip: list[Axes], drawing: Drawing, measured: Trajectory) -> str:
         axes.set_title(thrust, loc="right", y=1.0, size=9, color=SOFT, pad=4)
     size = f"drawn × {factor:g}" if factor > 1 else "to scale"
     bending = f"; bending {size}, dashed: unbent" if lines else ""
+    if drawing.turned > 1:
+        bending = f"; sprung joints turned × {drawing.turned:g}"
     arrows = "; arrows: thrust on the craft" if drawing.jets else ""
     return f"{view.words[0].upper()}{view.words[1:]}{bending}{arrows}"
 

@@ -50,7 +50,9 @@ def write(path: Path, compared: Pair, factor: float | None = None) -> None:
         factor=factor,
         channels=channels(a.flight, rest, below.machine, (a.flight, b.flight)),
         charts=below.charts,
-        notes=tuple(x for x in (bent(above.machine, factor), "Translucent: run A.") if x),
+        notes=tuple(
+            x for x in (bent(above.model, above.machine, factor), "Translucent: run A.") if x
+        ),
     )
     record.write(path, subject, b.flight, beneath, b.verdicts, page(compared, beneath.notes))
 
@@ -76,5 +78,4 @@ def _name(run: Run) -> str:
 
 
 def _factor(run: Run) -> float:
-    lengths = {boom.name: boom.length for boom in run.mission.machine.booms}
-    return suited_factor(run.flight, lengths)
+    return suited_factor(run.mission.mujoco.model.ptr, run.mission.machine, run.flight)

@@ -199,11 +199,12 @@ def _craft(columns: Columns, drawing: Drawing) -> Figure:
     }
     low = np.min([points.min(axis=0) for points in seen], axis=0)
     high = np.max([points.max(axis=0) for points in seen], axis=0)
+    turning = f"; sprung joints turned × {drawing.turned:g}" if drawing.turned > 1 else ""
     return {
         "id": "craft",
         "kind": "craft",
         "title": "At the cursor",
-        "seen": view.words,
+        "seen": view.words + turning,
         "axes": [view.right.tolist(), view.up.tolist(), view.near.tolist()],
         "middle": ((low + high) / 2).tolist(),
         "reach": (high - low).tolist(),

@@ -152,10 +152,12 @@ def write_pictures(
         predicted: Flight of the reduced plant.
         comparison: How it came out.
     """
-    from spacecraft_sim import drawing, plots, plots_chart, plots_law, plots_smooth, report
+    from spacecraft_sim import drawing, frames, plots, plots_chart, plots_law, plots_smooth, report
 
     title, charts = mission.scenario.title, charts_of(mission.controller)
-    drawn = drawing.draw(mission.mujoco.model.ptr, mission.machine, measured)
+    model, machine = mission.mujoco.model.ptr, mission.machine
+    factor = frames.suited_factor(model, machine, measured)
+    drawn = drawing.draw(model, machine, measured, turning=factor)
     plots.summary(
         folder / "summary.png",
         measured=measured,

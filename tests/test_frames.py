@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from spacecraft_sim import beam, frames, mission
+from spacecraft_sim import beam, drawing, frames, mission, mjcf, spacecraft
 from spacecraft_sim.drawing import cross
 from spacecraft_sim.mjcf import BUS
 from spacecraft_sim.trajectory import Trajectory, selected
@@ -160,15 +160,64 @@ def test_frames_are_close_enough_to_watch_and_few_enough_to_store(end, every):
     ("deflection", "factor"), [(0.0, 100.0), (0.02, 100.0), (0.375, 5.0), (2.0, 1.0), (9.0, 1.0)]
 )
 def test_the_factor_brings_the_largest_deflection_to_a_quarter_of_the_boom(deflection, factor):
+    machine = spacecraft.load("two_boom")
     tip = np.array([0.0, -deflection])
     still = np.zeros(2)
     signals = {"left_tip_y": tip, "left_tip_z": still}
     found = Trajectory(time=np.arange(2.0), signals=signals, units={})
-    assert frames.suited_factor(found, {"left": 7.5}) == factor
+    assert machine.booms[0].length == 7.5
+    assert frames.suited_factor(compiled(machine), machine, found) == factor
 
 
-def test_a_machine_without_booms_is_not_exaggerated():
-    assert frames.suited_factor(Trajectory(time=np.zeros(1), signals={}, units={}), {}) == 1.0
+def compiled(machine):
+    return mjcf.assemble(machine).compile()
+
+
+def test_a_machine_without_elastic_parts_is_not_exaggerated():
+    machine = spacecraft.load("rigid_body_free")
+    still = Trajectory(time=np.zeros(1), signals={}, units={})
+    assert frames.suited_factor(compiled(machine), machine, still) == 1.0
+
+
+@pytest.mark.parametrize(("turn", "factor"), [(0.0, 100.0), (0.004, 50.0), (0.4, 1.0)])
+def test_sprung_joints_of_a_free_machine_are_turned_too_far(turn, factor):
+    for name, joint in (("two_boom_3d", "left_x"), ("four_boom", "front")):
+        machine = spacecraft.load(name)
+        model = compiled(machine)
+        signals = dict(zip(coordinates(model), model.qpos0[:, None], strict=True))
+        half = np.array([turn]) / 2
+        if name == "four_boom":  # a ball, about its own x
+            signals |= {f"{joint}.qw": np.cos(half), f"{joint}.qx": np.sin(half)}
+        else:
+            signals[f"{joint}.angle"] = 2 * half
+        flight = Trajectory(time=np.zeros(1), signals=signals, units={})
+        assert frames.suited_factor(model, machine, flight) == factor
+        body = model.body(model.joint(joint).bodyid[0]).name
+        straight, drawn = frames.at_rest(model, machine), drawing.draw(
+            model, machine, flight, turning=factor
+        )  # fmt: skip
+        assert drawn.turned == factor
+        between = abs(float(drawn.quaternions[body][0] @ straight.quaternions[body][0]))
+        assert 2 * np.arccos(min(between, 1.0)) == pytest.approx(factor * turn, abs=1e-7)
+        np.testing.assert_allclose(drawn.quaternions["bus"], straight.quaternions["bus"])
+
+
+def coordinates(model):
+    """Names of the coordinates as flights have them."""
+    names = []
+    for j in range(model.njnt):
+        joint = model.joint(j).name
+        parts = {0: ("x", "y", "z", "qw", "qx", "qy", "qz"), 1: ("qw", "qx", "qy", "qz")}
+        names += [f"{joint}.{part}" for part in parts.get(int(model.jnt_type[j]), ("angle",))]
+    return names
+
+
+def test_without_coordinates_the_lean_of_the_bus_tells_how_far_joints_turn():
+    machine = spacecraft.load("two_boom_3d")
+    # One joint alone leans the bus by G = 40/366.7 of its angle.
+    lean = {"attitude_x": np.array([0.004 * 40 / 366.67]), "quasi_rigid_angle_x": np.zeros(1)}
+    flight = Trajectory(time=np.zeros(1), signals=lean, units={})
+    assert frames.suited_factor(compiled(machine), machine, flight) == 50.0
 
 
 def test_the_ghost_of_an_arm_is_posed_by_its_joints():
