@@ -1,5 +1,6 @@
 """Two runs over each other on one page."""
 
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,9 @@ Table = Sequence[tuple[str, Sequence[tuple[str, ...]]]]
 RUNS = (("#f29b38", 2.8), ("#1f6fd6", 1.1))  # colour and width: B thin over A
 DASHES = ("-", "--", ":", "-.")
 NEAR = 12.0  # s of thrust at the start and at the end
-LINES = 60  # of the table that find room
+PANEL, LINE = 3.5, 0.165  # heights of a panel with its key, and of a line of the table, inches
+COLUMNS = (0.645, 0.83, 1.0)  # right edges of those of the table after the first
+LETTERS = 50  # of a line of the first column
 
 
 def page(
@@ -31,6 +34,7 @@ def page(
     booms: Sequence[str],
     title: str,
     bands: tuple[Mapping[str, float], Mapping[str, float]],
+    units: Mapping[str, str],
     table: Table,
 ) -> None:
     """Draws two flights over each other, with the table of their differences.
@@ -42,6 +46,7 @@ def page(
         booms: Names of the booms of both.
         title: One line over the page.
         bands: Half-widths that signals of A and of B are to keep, by signal, rad.
+        units: Of the thruster channels.
         table: Headings, and below each rows of (what, A, B, B - A).
     """
     flights: Named = (("A", a), ("B", b))
@@ -54,20 +59,22 @@ def page(
     plane = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
     if all(name in flight.signals for name in plane for flight in (a, b)):
         panels += [partial(_phase_plane, flights=flights, names=plane, share=s) for s in (0.0, 0.9)]
-    panels += [partial(_thrust, flights=flights, share=share) for share in (0.0, 1.0)]
+    panels += [partial(_thrust, flights=flights, units=units, share=share) for share in (0.0, 1.0)]
     rows = -(-len(panels) // 2)
-    height = max(3.1 * rows + 0.9, 9.0)
+    lines = _lines(table)
+    height = max(PANEL * rows + 0.6, LINE * (len(lines) + 1) + 1.1)
     figure = Figure(figsize=(WIDTH, height), dpi=DPI)
     FigureCanvasAgg(figure)
     style = {"size": 17, "weight": "bold", "color": INK, "va": "center"}
     figure.text(0.012, 1 - 0.3 / height, title, **style)
     grid = figure.add_gridspec(
-        rows, 2, left=0.045, right=0.62, top=1 - 0.85 / height, bottom=0.6 / height,
-        hspace=0.42, wspace=0.2,
+        rows, 2, left=0.045, right=0.62, top=1 - 0.85 / height,
+        bottom=1 - (PANEL * rows - 0.5) / height, hspace=0.62, wspace=0.2,
     )  # fmt: skip
     for k, draw in enumerate(panels):
         draw(figure.add_subplot(grid[k // 2, k % 2]))
-    _table(figure.add_axes((0.65, 0.5 / height, 0.34, 1 - 1.1 / height)), table)
+    tall = LINE * (len(lines) + 1) / height
+    _table(figure.add_axes((0.65, 1 - 0.6 / height - tall, 0.34, tall)), lines)
     figure.savefig(path, pil_kwargs={"compress_level": 3})
 
 
@@ -95,7 +102,8 @@ def _history(
         axes.set_ylim(-1.6 * largest / scale, 1.6 * largest / scale)
     axes.set_xlim(0, max(flight.time[-1] for _, flight in flights))
     title = f"{group.title} within its bound" if largest else group.title
-    panel(axes, f"{title}, {letter}{group.unit}" if group.unit else title, "time, s")
+    panel(axes, f"{title}, {letter}{group.unit or '-'}", "time, s")
+    _key(axes)
 
 
 def _phase_plane(axes: Axes, *, flights: Named, names: tuple[str, str], share: float) -> None:
@@ -112,39 +120,57 @@ def _phase_plane(axes: Axes, *, flights: Named, names: tuple[str, str], share: f
     axis = names[0][-1]
     labels = f"quasi-rigid angle {axis}, {px}rad", f"quasi-rigid rate {axis}, {py}rad/s"
     panel(axes, f"Phase plane, {'last tenth' if share else 'whole flight'}", *labels)
+    _key(axes)
 
 
-def _thrust(axes: Axes, *, flights: Named, share: float) -> None:
+def _thrust(axes: Axes, *, flights: Named, units: Mapping[str, str], share: float) -> None:
     """The first channels of both, as delivered, over the first or the last seconds."""
-    channels = [n.removesuffix("_command") for n in flights[0][1].signals if n.endswith("_command")]
+    names = [n for _, f in flights for n in f.signals if f"{n}_command" in f.signals]
+    channels = [*dict.fromkeys(names)]
     end = share * min(float(flight.time[-1]) for _, flight in flights)
     start = max(end - NEAR, 0.0)
-    for k, channel in enumerate(channels[: len(DASHES)]):
-        for (run, flight), (color, width) in zip(flights, RUNS, strict=True):
-            if channel in flight.signals:
-                look = {"color": color, "linewidth": width, "linestyle": DASHES[k]}
-                value = flight[channel]
-                axes.step(flight.time, value, where="post", label=f"{run}: {channel}", **look)
+    for (run, flight), (color, width) in zip(flights, RUNS, strict=True):
+        own = [channel for channel in channels if channel in flight.signals]
+        for channel, dashes in zip(own, DASHES, strict=False):
+            look = {"color": color, "linewidth": width, "linestyle": dashes}
+            axes.step(flight.time, flight[channel], where="post", label=f"{run}: {channel}", **look)
     axes.set_xlim(start, start + NEAR)
     when = "to the end" if share else "from the start"
-    panel(axes, f"Thrust as delivered, {when}, N or N m", "time, s")
+    kinds = " or ".join(sorted({units[channel] for channel in channels}))
+    panel(axes, f"Thrust as delivered, {when}, {kinds}", "time, s")
+    _key(axes)
 
 
-def _table(axes: Axes, table: Table) -> None:
-    axes.set_axis_off()
+def _key(axes: Axes) -> None:
+    """Under the panel, in as many columns as there is room for."""
+    labels = axes.get_legend_handles_labels()[1]
+    columns = 4 if max(map(len, labels), default=0) < 10 else 3
+    deep = 0.42 * DPI / axes.get_window_extent().height  # under ticks and label
+    place = {"loc": "upper left", "bbox_to_anchor": (-0.02, -deep)}
+    axes.legend(ncols=columns, fontsize=8.5, frameon=False, borderpad=0.0, **place)
+
+
+def _lines(table: Table) -> list[tuple[str, ...]]:
+    """The lines of the table; a heading has no figures, and a long name takes two lines."""
     lines: list[tuple[str, ...]] = []
     for heading, rows in table:
-        lines += [(heading.upper(),), *(rows or [("none",)])]
-    count = max(len(lines), LINES)
-    axes.set(xlim=(0, 1), ylim=(count, -1))
-    for head, x in (("A", 0.66), ("B", 0.83), ("B - A", 1.0)):
+        lines.append((heading.upper(),))
+        for what, *figures in rows or [("none", "")]:
+            first, *more = textwrap.wrap(what, LETTERS, subsequent_indent="   ") or [""]
+            lines += [(first, *figures), *((part, "") for part in more)]
+    return lines
+
+
+def _table(axes: Axes, lines: Sequence[tuple[str, ...]]) -> None:
+    axes.set_axis_off()
+    axes.set(xlim=(0, 1), ylim=(len(lines), -1))
+    for head, x in zip(("A", "B", "B - A"), COLUMNS, strict=True):
         axes.text(x, -0.5, head, size=9, weight="bold", color=SOFT, ha="right", va="center")
-    for k, cells in enumerate(lines):
-        heading = len(cells) == 1 and cells[0].isupper()
-        style = {"size": 8, "va": "center", "color": SOFT if heading else INK}
-        axes.text(0.0, k + 0.5, _short(cells[0], 46), weight="bold" if heading else None, **style)
-        wide = 20 if any(cells[1:3]) else 60
-        for text, x in zip(cells[1:], (0.66, 0.83, 1.0), strict=False):
+    for k, (what, *figures) in enumerate(lines):
+        style = {"size": 8, "va": "center", "color": INK if figures else SOFT}
+        axes.text(0.0, k + 0.5, what, weight=None if figures else "bold", **style)
+        wide = 16 if any(figures[:2]) else 60
+        for text, x in zip(figures, COLUMNS, strict=False):
             axes.text(x, k + 0.5, _short(text, wide), ha="right", **style)
 
 

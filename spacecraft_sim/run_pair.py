@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,8 @@ import numpy as np
 
 from spacecraft_sim import mission
 from spacecraft_sim.compare import Difference, differences
+from spacecraft_sim.drawing import channel_units
+from spacecraft_sim.frames import at_rest
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.mission import Mission
 from spacecraft_sim.trajectory import Trajectory
@@ -31,12 +33,14 @@ class Run:
         mission: What was flown.
         flight: The flight of the MuJoCo plant.
         verdicts: What became of its claims.
+        units: Of its thruster channels, by name.
     """
 
     folder: Path
     mission: Mission
     flight: Trajectory
     verdicts: tuple[Verdict, ...]
+    units: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +103,8 @@ def read(folder: Path) -> Run:
     flown = mission.assemble(mission.load_scenario(scenario))
     flight = Trajectory.load(track)
     verdicts = tuple(guarantee.check(flight) for guarantee in flown.guarantees)
-    return Run(folder=folder, mission=flown, flight=flight, verdicts=verdicts)
+    units = channel_units(flight, at_rest(flown.mujoco.model.ptr, flown.machine))
+    return Run(folder=folder, mission=flown, flight=flight, verdicts=verdicts, units=units)
 
 
 def pair(a: Run, b: Run) -> Pair:
@@ -113,7 +118,7 @@ def pair(a: Run, b: Run) -> Pair:
         a=a,
         b=b,
         settings=tuple(_settings(a, b)),
-        figures=tuple(_beside(_figures(a.flight), _figures(b.flight))),
+        figures=tuple(_beside(_figures(a), _figures(b))),
         claims=tuple(_claims(a, b)),
         signals=_signals(a.flight, b.flight),
     )
@@ -189,7 +194,7 @@ def _word(value: Any) -> str:
     if value is None:
         return "-"
     if isinstance(value, list):
-        return ", ".join(_word(x) for x in value)
+        return ", ".join(_word(x) for x in value) or "none"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
@@ -219,7 +224,8 @@ def _flat(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{prefix}{key}", value
 
 
-def _figures(flight: Trajectory) -> Figures:
+def _figures(run: Run) -> Figures:
+    flight = run.flight
     late = flight.time >= flight.time[0] + (1 - LATE) * (flight.time[-1] - flight.time[0])
     found: Figures = {("flight", "s"): float(flight.time[-1])}
     kinds = {
@@ -233,16 +239,13 @@ def _figures(flight: Trajectory) -> Figures:
             words, unit = kind.replace("quasi_", "quasi-").replace("_", " "), flight.units[names[0]]
             found[f"largest {words}", unit] = float(size.max())
             found[f"largest {words} in the last tenth", unit] = float(size[late].max())
-    for name in flight.signals:
-        if name.endswith("_tip_y"):
-            deflection = float(np.abs(flight[name]).max())
-            found[f"largest deflection of boom {name.removesuffix('_tip_y')}", "m"] = deflection
-        elif name.endswith("_command"):
-            channel, command = name.removesuffix("_command"), flight[name]
-            changes = float(np.count_nonzero(np.diff(command)))
-            spent = f"{channel}_spent"
-            found[f"changes of command of {channel}", ""] = changes
-            found[f"impulse spent by {channel}", flight.units[spent]] = float(flight[spent][-1])
+    for boom in run.mission.machine.booms:  # other elastic parts have no one way to bend
+        deflection = float(np.abs(flight[f"{boom.name}_tip_y"]).max())
+        found[f"largest deflection of boom {boom.name}", "m"] = deflection
+    for channel, unit in run.units.items():
+        changes = float(np.count_nonzero(np.diff(flight[f"{channel}_command"])))
+        found[f"changes of command of {channel}", ""] = changes
+        found[f"impulse spent by {channel}", f"{unit} s"] = float(flight[f"{channel}_spent"][-1])
     return found
 
 

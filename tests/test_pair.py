@@ -5,8 +5,10 @@ import json
 import numpy as np
 import pytest
 import rrd
+from matplotlib.figure import Figure
+from written import faults, texts
 
-from spacecraft_sim import cli, run_pair
+from spacecraft_sim import cli, run_folder, run_pair
 from spacecraft_sim.trajectory import Trajectory
 
 NAME = "efremov-nonlocal"
@@ -28,6 +30,9 @@ def runs(tmp_path_factory):
     free = ("spacecraft='two_boom_free'", "reduced.source='mjcf'", "duration=12.0",
             "controller.attraction_level=0.2")  # fmt: skip
     cli.main(["run", NAME, "--out", str(base / "free"), "--set", *free])
+    for name, scenario in (("arm", "burkov-position"), ("axes", "sokolov-quasi-rigid")):
+        words = ["run", scenario, "--out", str(base / name), "--set", "duration=1.5"]
+        cli.main(words)
     return base
 
 
@@ -134,6 +139,29 @@ def test_the_command_writes_table_figure_and_recording(a, b, runs, tmp_path, cap
     assert page.startswith("# A: ")
     for row in table["settings"]:
         assert row["what"] in page
+
+
+def test_units_are_those_of_the_channels_and_booms_those_of_the_machine(runs):
+    rows = {(row.what, row.unit) for row in compared(runs, "one", "seed").figures}
+    assert ("impulse spent by thruster_z", "N m s") in rows
+    assert ("largest deflection of boom left", "m") in rows
+
+
+@pytest.mark.parametrize(
+    ("a", "b"), [("one", "seed"), ("one", "local"), ("free", "boom"), ("boom", "arm"),
+                 ("axes", "seed")]
+)  # fmt: skip
+def test_all_that_is_written_in_the_figure_can_be_read(a, b, runs, tmp_path, monkeypatch):
+    kept, save = [], Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda f, *x, **k: (kept.append(f), save(f, *x, **k)))
+    run_folder.write_pair(tmp_path, compared(runs, a, b), None)
+    (figure,) = kept
+    assert faults(figure) == []
+    named = " ".join(words for words, _ in texts(figure))
+    for key, name in (("A", a), ("B", b)):  # the channels of both, each with its unit
+        for channel in run_pair.read(runs / name).units:
+            assert f"{key}: {channel}" in named
+    assert "N or N m" not in named or a == "axes"  # whose channels are forces
 
 
 @pytest.mark.parametrize("missing", ["scenario.toml", "trajectory.parquet"])

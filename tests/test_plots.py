@@ -8,6 +8,7 @@ from flown import FREE, ON_AN_AXIS, flown
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import FancyArrowPatch
+from written import faults, texts
 
 from spacecraft_sim import plots, plots_chart, plots_film, plots_law, plots_smooth, spans, sphere
 from spacecraft_sim.chart import charts_of, vectors
@@ -113,20 +114,6 @@ def test_no_key_covers_a_curve(page):
         assert [axes.get_legend() for axes in figure.axes] == [None] * len(figure.axes)
 
 
-def texts(figure):
-    """All that is written on a page, with the boxes that it takes."""
-    found = [*figure.texts]
-    for axes in figure.axes:
-        found += [axes.title, axes._left_title, axes._right_title, *axes.texts]
-        found += axes.get_legend().get_texts() if axes.get_legend() else []
-        for axis in (axes.xaxis, axes.yaxis) if axes.axison else ():
-            low, high = sorted(axis.get_view_interval())
-            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
-            found += [tick.label1 for tick in ticks if low <= tick.get_loc() <= high]
-            found.append(axis.get_offset_text())
-    return [(x.get_text(), box) for x in found if (box := x.get_window_extent()).width > 0]
-
-
 def coasting():
     """A flight whose rate differs from a round figure by very little."""
     flight = flown(*PLANAR)
@@ -148,13 +135,8 @@ def coasting():
 )
 def test_all_that_is_written_stays_on_the_page_and_off_each_other(flight, page):
     figure, _ = page(flight())
-    found = texts(figure)
-    assert len(found) > 80
-    for k, (words, box) in enumerate(found):
-        assert box.x0 >= 0, words
-        assert box.x1 <= figure.bbox.x1, words
-        for others, other in found[k + 1 :]:
-            assert not box.overlaps(other), (words, others)
+    assert len(texts(figure)) > 80
+    assert faults(figure) == []
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,32 @@
+"""What is written in a figure, and whether it can be read."""
+
+
+def texts(figure):
+    """All that is written on a page, with the boxes that it takes."""
+    found = [*figure.texts]
+    for axes in figure.axes:
+        found += [axes.title, axes._left_title, axes._right_title, *axes.texts]
+        found += axes.get_legend().get_texts() if axes.get_legend() else []
+        for axis in (axes.xaxis, axes.yaxis) if axes.axison else ():
+            low, high = sorted(axis.get_view_interval())
+            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            found += [tick.label1 for tick in ticks if low <= tick.get_loc() <= high]
+            found.append(axis.get_offset_text())
+    return [(x.get_text(), box) for x in found if (box := x.get_window_extent()).width > 0]
+
+
+def faults(figure):
+    """Words that leave the page, and words that cover each other."""
+    found = texts(figure)
+    page = figure.bbox
+    outside = [
+        words
+        for words, box in found
+        if box.x0 < 0 or box.x1 > page.x1 or box.y0 < 0 or box.y1 > page.y1
+    ]
+    return outside + [
+        (words, others)
+        for k, (words, box) in enumerate(found)
+        for others, other in found[k + 1 :]
+        if box.overlaps(other)
+    ]
