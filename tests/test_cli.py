@@ -289,7 +289,8 @@ def own_machine(tmp_path):
     return make
 
 
-def test_a_users_own_machine_flies(own_machine, tmp_path, capsys):
+def test_a_users_own_machine_flies(own_machine, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("spacecraft_sim.run_folder.write_pictures", lambda *_: None)  # slow
     assert run(tmp_path / "out", *SHORT, name=own_machine()) == 1
     other = tmp_path / "elsewhere" / "scenario.toml"
     other.parent.mkdir()

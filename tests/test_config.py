@@ -32,10 +32,15 @@ tables = st.dictionaries(
 )
 
 
-@settings(max_examples=50)
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """One file for all examples: a folder for each took seconds."""
+    return tmp_path_factory.mktemp("toml") / "table.toml"
+
+
+@settings(max_examples=30)
 @given(table=tables)
-def test_table_survives_the_file_to_the_last_bit(table, tmp_path_factory):
-    path = tmp_path_factory.mktemp("toml") / "table.toml"
+def test_table_survives_the_file_to_the_last_bit(table, path):
     path.write_text(config.dumps(table), encoding="utf-8", newline="\n")
     assert config.read(path) == table
 
