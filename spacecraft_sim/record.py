@@ -107,8 +107,8 @@ class Recording:
         self._stream = stream = rr.RecordingStream(APPLICATION, recording_id=uuid4())
         sinks = [rr.FileSink(path)] if path else []
         sinks += [rr.GrpcSink(viewer)] if viewer else []
-        if path:  # where there is no room at all, rerun waits for ever
-            path.write_bytes(bytes(ROOM))
+        if path:
+            _make_sure_of_room(path.with_suffix(".room"))
         stream.set_sinks(*sinks)
         stream.send_recording_name(subject.title)
         self._rest = at_rest(subject.model, subject.machine)
@@ -364,6 +364,14 @@ class Recording:
 
     def _root(self, key: str) -> str:
         return f"world/{key}"
+
+
+def _make_sure_of_room(path: Path) -> None:
+    """Writes a file and takes it away: where there is no room at all, rerun waits for ever."""
+    try:
+        path.write_bytes(bytes(ROOM))
+    finally:
+        path.unlink(missing_ok=True)
 
 
 def _whole(path: Path) -> bool:

@@ -73,6 +73,7 @@ def test_a_disk_that_is_full_from_the_start_is_told_before_the_flight(limited, t
     assert f"{out} cannot be written to its end" in message
     assert "File too large" in message
     assert "Traceback" not in message
+    assert not list(out.glob("*.room"))
 
 
 def test_a_recording_that_does_not_close_is_left(short, tmp_path, monkeypatch):
