@@ -49,6 +49,7 @@ Nozzles = dict[str, list[record_scene.Nozzle]]
 LOOKS = 60  # instants of a flight at which it is looked how far an arm reaches
 _FOOTER = b"RRF2FOOT"  # and four bytes more end a file that is whole
 ROOM = 1_000_000  # bytes that a disk must have for a recording to begin
+UNFINISHED = "cannot be written to its end; is the disk full? 'repair' keeps the rest"
 PLUME = 0.25  # longest plume, in sizes of the spacecraft
 
 
@@ -137,8 +138,8 @@ class Recording:
         if closing.is_alive():
             self._lose(f"not closed within {4 * PATIENCE:g} s")
             rr.unregister_shutdown()  # at the end of the process it would wait again
-        elif self._path and not _whole(self._path):
-            self._lose("it has no footer")
+        if self._path and not self.lost_file and not _whole(self._path):
+            self.lost_file = f"{self._path}: {UNFINISHED} (it has no footer)"
 
     def expect(self, beneath: Beneath) -> None:
         """Takes the flight that is known beforehand, and lays out the views.
@@ -321,11 +322,22 @@ class Recording:
         self._stream.send_blueprint(blueprint(layout, following=False))
         if self._viewer:
             self._flush()
-            aside = rr.RecordingStream(APPLICATION, recording_id=self._stream.get_recording_id())
-            aside.connect_grpc(self._viewer)
-            aside.send_blueprint(blueprint(layout, following=True))
+        if self._viewer and not self.lost_viewer:  # one that is frozen would stop the run
+            sending = Thread(target=self._send_following, args=(layout, self._viewer), daemon=True)
+            sending.start()
+            sending.join(PATIENCE)
+            if sending.is_alive():
+                self._lose(f"it takes no layout within {PATIENCE:g} s")
+
+    def _send_following(self, layout: Layout, viewer: str) -> None:
+        aside = rr.RecordingStream(APPLICATION, recording_id=self._stream.get_recording_id())
+        aside.connect_grpc(viewer)
+        aside.send_blueprint(blueprint(layout, following=True))
+        try:
             aside.flush(timeout_sec=self._patience)
-            aside.disconnect()
+        except RuntimeError as error:
+            self._lose(str(error))
+        aside.disconnect()
 
     def _acting(self) -> list[str]:
         """Channels that act in a flight that is known; all if none does."""
@@ -357,8 +369,7 @@ class Recording:
 
     def _lose(self, reason: str) -> None:
         if self._path and (not self._viewer or "File-writer" in reason):
-            where = f"{self._path}: cannot be written to its end; is the disk full?"
-            self.lost_file = self.lost_file or f"{where} ({reason})"
+            self.lost_file = self.lost_file or f"{self._path}: {UNFINISHED} ({reason})"
         else:
             self.lost_viewer = self.lost_viewer or f"the viewer was lost: {reason}"
 
