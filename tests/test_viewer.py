@@ -216,6 +216,22 @@ def test_a_run_outlives_its_viewer(tmp_path):
         assert rrd.chunks(path)
 
 
+@live
+def test_a_frozen_viewer_stops_no_run(tmp_path):
+    with opened() as address:
+        port = str(urlsplit(address).port)
+        for process in psutil.Process().children(recursive=True):
+            if port in process.cmdline():
+                process.suspend()  # it still listens: the system takes what comes, up to a limit
+        run = started(tmp_path / "out", address, "duration=60.0")
+        _, message = run.communicate(timeout=120)
+    assert run.returncode in (0, 1), message
+    assert "the viewer was lost" in message
+    path = tmp_path / "out" / "recording.rrd"
+    assert rrd.chunks(path)
+    assert rrd.read(path)["/attitude/simulated"].time[-1] == 60.0
+
+
 def started(out, address, *settings):
     """A run in a process of its own that shows its flight."""
     words = ["run", NAME, "--out", str(out), "--connect", address, "--set", *settings]
