@@ -3,8 +3,9 @@
 Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or bad input, 3 the run diverged or crashed,
 or what it leaves cannot be written.
 A certificate holds if the attitude is guaranteed about each axis and every assumption holds.
-Heavy modules are imported by the commands that need them.
 """
+
+# Heavy modules are imported by the commands that need them.
 
 import argparse
 import gc
