@@ -212,6 +212,7 @@ def design(
             level=law.level,
             torque_gain=torque_gain(model, axis),
             sensors=signals,
+            estimated=dict(zip(found[axis].sensors, errors[axis], strict=False)) if errors else {},
             channel=law.thrusters[0],
             decay=model.slowest_decay,
             period=period,

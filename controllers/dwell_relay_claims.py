@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controllers.observer import ESTIMATED
 from spacecraft_sim.dwell_axes import Band
 from spacecraft_sim.guarantee import Assumption, Guarantee, Measurement
 from spacecraft_sim.small_motion import slow_rotation, small_deflection
@@ -32,6 +33,8 @@ class Claims:
         level: Thrust that accelerates to plus, N or N m.
         torque_gain: Acceleration at 1 N m, rad/s^2.
         sensors: Names of angle and rate that are fed back.
+        estimated: Names of what an observer estimates, with the bounds of its errors at samples,
+            rad and rad/s; none if all is measured.
         channel: Name of the thruster.
         period: Sampling period, s; None in continuous time.
         decay: Of the slowest elastic motion, 1/s; inf if there is none.
@@ -43,6 +46,7 @@ class Claims:
     level: float
     torque_gain: float
     sensors: tuple[str, str]
+    estimated: dict[str, float]
     channel: str
     decay: float
     period: float | None
@@ -147,6 +151,7 @@ class Claims:
                 relation="<=",
                 unit="rad/s",
             ),
+            *self._observed(track, row),
             *small_deflections(track),
         ]
         if math.isfinite(self.decay):
@@ -169,6 +174,22 @@ class Claims:
             return 0.0
         mean = (np.diff(rate[rows]) - np.diff(thrust[rows])) / span
         return float(np.max(np.abs(mean - axis.bias * axis.acceleration)))
+
+    def _observed(self, track: Trajectory, row: int) -> tuple[Assumption, ...]:
+        """That an observer is as good as its bounds, its start forgotten."""
+        if self.period is None:
+            return ()
+        rows = row + sample_rows(track.time[row:], self.period)[0]
+        return tuple(
+            Assumption(
+                text=f"{self.axis}: error of the estimate",
+                value=float(np.abs(track[f"{ESTIMATED}{name}"] - track[name])[rows].max()),
+                limit=limit,
+                relation="<=",
+                unit=track.units[name],
+            )
+            for name, limit in self.estimated.items()
+        )
 
     def _samples(self, time: Array) -> Array:
         """Rows between which a mean may be taken: between samples an estimate does not follow."""

@@ -157,6 +157,14 @@ def test_another_machine_than_the_observer_believes_is_told():
     assert any("|eps| <= e in flight" in a.text for a in verdict.failed)
 
 
+def test_an_observer_that_has_not_forgotten_its_start_is_told():
+    # The law enters its contour at once, while the observer still takes the bus to be at rest.
+    ready = assembled("sokolov-estimated", "duration=20.0", "initial.rate=[1e-4, 0.0, 0.0]")
+    verdict = attitude_claims(ready)["x"].check(ready.fly())
+    assert not verdict.holds
+    assert "x: error of the estimate" in [a.text for a in verdict.failed]
+
+
 def test_commands_between_samples_are_foretold():
     # A delay that is no multiple of the period; the start is at rest: the estimate is exact.
     late = "thrusters.all.delay=0.13", "duration=60.0"
