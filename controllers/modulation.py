@@ -25,6 +25,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, TypeAdapter, model_validator
 
 from controllers.axis import SIGNS, Ways
+from spacecraft_sim.chart import Charts, charts_of
 from spacecraft_sim.checks import positive
 from spacecraft_sim.config import Model, quantity
 from spacecraft_sim.controller import Controller
@@ -201,6 +202,11 @@ class Modulated:
         """Sampling period, s; None if pulses end between samples."""
         whole = not any(isinstance(m, PulseWidth) for m in self.modulators)
         return self.sampling if whole else None
+
+    @property
+    def charts(self) -> Charts:
+        """Charts of the law."""
+        return charts_of(self.law)
 
     def init(self) -> Memory:
         """Returns the memory of a law before its first sample, every channel off."""

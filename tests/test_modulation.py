@@ -199,6 +199,12 @@ def test_relay_thrusters_settle_into_the_dead_band_on_both_plants(name):
         assert verdict.measured > 0.3 * verdict.predicted
 
 
+def test_the_charts_are_those_of_the_law_that_asks():
+    law = mission.assemble(mission.load_scenario("burkov-pwm")).controller
+    assert law.charts == law.law.charts
+    assert {chart.name for chart in law.charts} >= {"energy", "vectors"}
+
+
 def test_claims_fail_on_a_flight_that_breaks_them():
     ready = mission.assemble(mission.load_scenario("burkov-pwm", ("duration=30.0",)))
     track = ready.fly()
