@@ -33,13 +33,13 @@ def compare(arguments: argparse.Namespace) -> int:
         The exit code.
     """
     require_supported_mujoco()
-    from spacecraft_sim import run_folder, run_pair
+    from spacecraft_sim import pair_folder, run_folder, run_pair
 
     factor = terminal.exaggeration(arguments)
     compared = run_pair.pair(run_pair.read(arguments.a), run_pair.read(arguments.b))
     name = f"{arguments.a.resolve().name}-and-{arguments.b.resolve().name}"
     folder = run_folder.create(arguments.out, name)
-    run_folder.write_pair(folder, compared, factor)
+    pair_folder.write(folder, compared, factor)
     table = Table("", "A", "B", "B - A", box=None)
     for heading, rows in run_pair.table(compared):
         table.add_row(f"[bold]{heading}[/]")

@@ -20,7 +20,6 @@ from spacecraft_sim.versions import versions
 
 if TYPE_CHECKING:
     from spacecraft_sim.beneath import Subject
-    from spacecraft_sim.run_pair import Pair, Run
 
 
 def create(path: Path | None, name: str) -> Path:
@@ -182,36 +181,6 @@ def write_pictures(
         comparison=comparison,
         scenario_toml=resolved(mission.scenario),
     )
-
-
-def write_pair(folder: Path, compared: "Pair", factor: float | None) -> None:
-    """Writes `comparison.json`, `comparison.png` and `recording.rrd` of two runs.
-
-    Args:
-        folder: The folder.
-        compared: The runs.
-        factor: How many times too far booms are bent; a round factor if left out.
-    """
-    from spacecraft_sim import plots_pair, record_pair, run_pair
-
-    run_pair.write_json(folder / "comparison.json", compared)
-    a, b = compared.a, compared.b
-    names = [f"{run.mission.scenario.name} ({run.folder.resolve().name})" for run in (a, b)]
-    plots_pair.page(
-        folder / "comparison.png",
-        a=a.flight,
-        b=b.flight,
-        title=f"A: {names[0]},  B: {names[1]}",
-        booms=[x.name for x in a.mission.machine.booms if x.name in _booms(b)],
-        bands=(a.mission.bands, b.mission.bands),
-        units={**b.units, **a.units},
-        table=run_pair.table(compared),
-    )
-    record_pair.write(folder / "recording.rrd", compared, factor)
-
-
-def _booms(run: "Run") -> set[str]:
-    return {boom.name for boom in run.mission.machine.booms}
 
 
 def _plain(verdict: Verdict) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import rrd
 from matplotlib.figure import Figure
 from written import faults, texts
 
-from spacecraft_sim import cli, run_folder, run_pair
+from spacecraft_sim import cli, pair_folder, run_pair
 from spacecraft_sim.trajectory import Trajectory
 
 NAME = "efremov-nonlocal"
@@ -154,7 +154,7 @@ def test_units_are_those_of_the_channels_and_booms_those_of_the_machine(runs):
 def test_all_that_is_written_in_the_figure_can_be_read(a, b, runs, tmp_path, monkeypatch):
     kept, save = [], Figure.savefig
     monkeypatch.setattr(Figure, "savefig", lambda f, *x, **k: (kept.append(f), save(f, *x, **k)))
-    run_folder.write_pair(tmp_path, compared(runs, a, b), None)
+    pair_folder.write(tmp_path, compared(runs, a, b), None)
     (figure,) = kept
     assert faults(figure) == []
     named = " ".join(words for words, _ in texts(figure))
