@@ -279,9 +279,11 @@ def _or_inf(p0: Regulator, F: float, e: float) -> float:
 
 
 def _decay(elastic: ElasticModel, found: Influence, k: int) -> float:
-    """Decay of the mode with the largest part in the moment about the axis."""
-    part = np.abs(found.modes.accelerations(elastic.H[k])[:, 0]) @ found.torque
-    return float(-found.modes.eigenvalues[int(np.argmax(part))].real)
+    """Decay of the mode with the largest part in the moment about the axis, rung up."""
+    decays = -found.modes.eigenvalues.real
+    parts = np.abs(found.modes.accelerations(elastic.H[k])[:, 0])
+    built = (parts / -np.expm1(-np.outer(decays, found.dwell))) @ found.torque
+    return float(decays[int(np.argmax(built))])
 
 
 def _assumptions(

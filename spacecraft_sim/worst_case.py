@@ -60,6 +60,7 @@ def worst_case(
     relay: Literal[2, 3] = 2,
     step: float | None = None,
     horizon: float | None = None,
+    points: int | None = None,
 ) -> WorstCase:
     """Finds the switching that drives the moment of the elastic parts farthest about an axis.
 
@@ -73,6 +74,7 @@ def worst_case(
             period of the fastest mode that counts.
         horizon: Length of the schedule, s; by default a dwell and the time in which the slowest
             mode dies out to a thousandth.
+        points: Grid points of a channel at most: the default step is as long as that needs.
 
     Returns:
         The schedule.
@@ -92,7 +94,7 @@ def worst_case(
         rest=np.zeros(3),
         scale=float(np.abs(amplitudes).sum(axis=0).max()),
     )
-    return _search(output, torque, dwell, relay, step, horizon)
+    return _search(output, torque, dwell, relay, step, horizon, points)
 
 
 def worst_deflection(
@@ -153,6 +155,7 @@ def _search(
     relay: int,
     step: float | None,
     horizon: float | None,
+    points: int | None = None,
 ) -> WorstCase:
     """Each channel on its own."""
     eigenvalues, amplitudes = output.eigenvalues, output.amplitudes
@@ -169,7 +172,10 @@ def _search(
     built = (np.abs(amplitudes) / -np.expm1(np.outer(np.real(eigenvalues), hold)))[:, heard]
     built = built.max(axis=1, initial=0.0)
     period = 2 * np.pi / float(np.max(np.abs(eigenvalues)[built >= _COUNTS * built.max()]))
-    wanted = period / _POINTS_PER_PERIOD if step is None else step
+    if step is None:
+        wanted = max(period / _POINTS_PER_PERIOD, T / points if points else 0.0)
+    else:
+        wanted = step
     positive(step=wanted, horizon=T)
     if max(lasting.max(), wanted) >= T:
         raise ValueError(
@@ -231,12 +237,13 @@ def _two_levels(s: Array, end: float, gap: int) -> tuple[float, Array, Array]:
         fall[block] = np.maximum(_best_from(down), fall[block.stop])
     sign, j, at, signs = (1.0, 0, [], [1.0]) if rise[0] >= fall[0] else (-1.0, 0, [], [-1.0])
     value = max(rise[0], fall[0])
+    losses = {1.0: (-rise, end), -1.0: (-fall, -end)}  # ascending
     while True:
-        table, stop = (rise, end) if sign > 0 else (fall, -end)
-        if j >= n or table[j] <= stop:
+        loss, stop = losses[sign]
+        if j >= n or -loss[j] <= stop:
             break
-        # The table falls only where its best switching is left behind.
-        k = int(np.searchsorted(-table, -table[j], side="right")) - 1
+        # The table changes only where its best switching is left behind.
+        k = int(np.searchsorted(loss, loss[j], side="right")) - 1
         at.append(k)
         sign, j = -sign, k + gap
         signs.append(sign)
@@ -261,18 +268,19 @@ def _three_levels(s: Array, end: float, gap: int) -> tuple[float, Array, Array]:
     options = (free[0], high[0], low[0])
     state = int(np.argmax(options))
     value, j, at, signs = options[state], 0, [], []
+    losses = -free, -high[:n], -low[:n]  # ascending
     while True:
         if state == 0:
             signs.append(0.0)
             if free[j] <= 0:
                 break
-            k = int(np.searchsorted(-free, -free[j], side="right")) - 1
+            k = int(np.searchsorted(losses[0], losses[0][j], side="right")) - 1
             at.append(k)
             state = 1 if high[k + gap] - s[k] >= low[k + gap] + s[k] else 2
             j = k + gap
         signs.append(1.0 if state == 1 else -1.0)
         table, ends = (high, end) if state == 1 else (low, -end)
-        k = int(np.searchsorted(-table[:n], -table[j], side="right")) - 1
+        k = int(np.searchsorted(losses[state], losses[state][j], side="right")) - 1
         if k == n - 1 and table[j] == ends:
             break
         at.append(k)

@@ -297,6 +297,15 @@ def test_the_worst_schedule_flown(case):
         assert angle == pytest.approx(joint, rel=0.01, abs=5e-5)  # one or two digits given
 
 
+def test_a_coarser_grid_finds_nearly_as_much_and_no_more():
+    elastic = structure("four_boom")
+    fine = worst_case(elastic, torque=0.02, dwell=2.0, axis="z")
+    for points, near in ((40_000, 1e-3), (5_000, 0.05)):
+        coarse = worst_case(elastic, torque=0.02, dwell=2.0, axis="z", points=points)
+        # (omega step)^2/8 with 2.1 rad/s and 8 or 70 ms; the fine grid may miss 1e-4 itself.
+        assert (1 - near) * fine.moment < coarse.moment < (1 + 2e-4) * fine.moment
+
+
 # -- what is refused -------------------------------------------------------------------------------
 
 
