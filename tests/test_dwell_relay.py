@@ -165,6 +165,24 @@ def test_an_observer_that_has_not_forgotten_its_start_is_told():
     assert "x: error of the estimate" in [a.text for a in verdict.failed]
 
 
+@pytest.mark.parametrize("told", [1e-3, 0.0])
+def test_a_steady_torque_that_the_observer_is_told_of_costs_it_nothing(told):
+    pushed = 'disturbance.x={waveform="square", amplitude=1e-3, frequency=1e-6}'
+    ready = assembled(
+        "sokolov-estimated", "duration=100.0", pushed, f"controller.bias=[{told}, 0.0, 0.0]"
+    )
+    track = ready.fly("reduced")
+    rows, _ = sample_rows(track.time, 0.05)
+    error = track["estimated_quasi_rigid_angle_x"] - track["quasi_rigid_angle_x"]
+    verdict = attitude_claims(ready)["x"].check(track)
+    assert verdict.holds == bool(told)
+    if told:
+        assert np.abs(error[rows]).max() < 1e-15  # rounding of 1e-4 rad over 2000 samples
+    else:
+        assert np.abs(error[rows]).max() > 1e-7
+        assert "x: error of the estimate" in [a.text for a in verdict.failed]
+
+
 def test_commands_between_samples_are_foretold():
     # A delay that is no multiple of the period; the start is at rest: the estimate is exact.
     late = "thrusters.all.delay=0.13", "duration=60.0"
