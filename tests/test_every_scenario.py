@@ -9,6 +9,7 @@ import rrd
 from browser import CHROMIUM, MISSING, Page
 
 from spacecraft_sim import cli, library, mission
+from spacecraft_sim.chart import charts_of, vectors
 from spacecraft_sim.signal_groups import groups
 from spacecraft_sim.trajectory import Trajectory
 
@@ -43,7 +44,8 @@ def test_the_recording_is_whole_and_its_last_samples_are_the_flights(ran):
     entities = rrd.read(path)
     flights = [Trajectory.load(folder / f"{x}.parquet") for x in ("trajectory", "reduced")]
     ready = mission.assemble(mission.load_scenario(folder / "scenario.toml"))
-    plotted = groups(flights, [boom.name for boom in ready.machine.booms])
+    directions = vectors(charts_of(ready.controller), flights[0])
+    plotted = groups(flights, [boom.name for boom in ready.machine.booms], directions)
     assert len(plotted) >= 2
     for group in plotted:
         for key, flight in zip(("simulated", "reduced"), flights, strict=True):
