@@ -74,6 +74,28 @@ class Plan:
             spin=tuple((self.spin * extra[3:]).tolist()),
         )
 
+    def resonances(self, eigenvalues: Array, parts: Array) -> list[Array]:
+        """Returns a point for each mode whose half periods the channels can switch at.
+
+        Args:
+            eigenvalues: lambda of the modes, shape (k,), 1/s.
+            parts: Amplitude of each mode after a step of each channel, shape (k, 3); the channels
+                start in the senses in which theirs add up.
+        """
+        found = []
+        for eigenvalue, part in zip(eigenvalues.tolist(), parts, strict=True):
+            if eigenvalue.imag <= 0:
+                continue
+            half = np.pi / eigenvalue.imag
+            odd = 2 * np.ceil((self.dwell / half - 1) / 2) + 1  # half periods past the dwell
+            share = 2 * (np.maximum(odd, 1) * half - self.dwell) / self.wait - 1
+            if np.all(share <= 1):
+                along = np.real(part / part[int(np.argmax(np.abs(part)))])
+                senses = np.where(along < 0, -1.0, 1.0)
+                channels = np.column_stack([senses, *[share] * self.knots])
+                found.append(np.r_[channels.ravel(), np.zeros(6)])
+        return found
+
 
 def search(
     model: Any,
@@ -88,7 +110,7 @@ def search(
     disturbance: float = 0.0,
     spin: float = 0.0,
 ) -> tuple[Schedule, Found]:
-    """Searches for the worst flight.
+    """Searches for the worst flight, from switchings at half periods of each mode.
 
     Args:
         model: The compiled model.
@@ -133,7 +155,9 @@ def search(
         return float(np.abs(flight[f"moment_{axis}"]).max()) / scale
 
     box = [(-1.0, 1.0)] * plan.variables
-    best = falsify(share, box, evaluations=evaluations, rng=rng)
+    parts = found.modes.accelerations(elastic.H[AXES.index(axis)])[:, 0]
+    starts = plan.resonances(found.eigenvalues, parts)
+    best = falsify(share, box, evaluations=evaluations, rng=rng, starts=starts)
     return plan.schedule(best.x), best
 
 

@@ -47,6 +47,7 @@ def falsify(
     *,
     evaluations: int,
     rng: np.random.Generator,
+    starts: Sequence[Array] = (),
 ) -> Found:
     """Searches a box for the largest value of a function.
 
@@ -55,6 +56,7 @@ def falsify(
         bounds: Least and largest value of each variable.
         evaluations: How often the objective may be asked.
         rng: Source of all that is random.
+        starts: Points that are asked first; the search begins from the worst of them.
 
     Returns:
         The worst that was found.
@@ -86,10 +88,13 @@ def falsify(
             best = (value, x)
         return value
 
+    for x in starts[:evaluations]:
+        ask((np.asarray(x, dtype=float) - low) / width)
     population = 4 + int(3 * math.log(len(box)))  # (48)
+    mean = (best[1] - low) / width if len(starts) else rng.uniform(size=len(box))
     while len(values) < evaluations:
-        _climb(ask, len(box), population, evaluations - len(values), rng)
-        population *= 2
+        _climb(ask, mean, population, evaluations - len(values), rng)
+        mean, population = rng.uniform(size=len(box)), 2 * population
     return Found(
         x=best[1],
         value=best[0],
@@ -99,10 +104,14 @@ def falsify(
 
 
 def _climb(
-    ask: Callable[[Array], float], n: int, population: int, budget: int, rng: np.random.Generator
+    ask: Callable[[Array], float],
+    mean: Array,
+    population: int,
+    budget: int,
+    rng: np.random.Generator,
 ) -> None:
     """One run, until its population has come together or the budget is spent."""
-    mean, step = rng.uniform(size=n), _START
+    n, step = len(mean), _START
     half = population // 2
     weights = math.log((population + 1) / 2) - np.log(np.arange(1, half + 1))  # (49)
     weights /= weights.sum()

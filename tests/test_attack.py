@@ -170,6 +170,29 @@ def test_points_of_the_search_are_schedules():
     np.testing.assert_allclose(gaps, 1 + 6 * np.arange(len(gaps)) / 7, rtol=1e-14)
 
 
+def test_switchings_at_half_periods_ring_each_mode_up():
+    model, elastic = shipped("two_boom_3d")
+    found = influence(elastic, torque=0.02, dwell=2.66)
+    plan = Plan(
+        torque=found.torque, dwell=found.dwell, wait=6.0, knots=3, duration=200.0,
+        disturbance=0.0, spin=0.0,
+    )  # fmt: skip
+    parts = found.modes.accelerations(elastic.H[0])[:, 0]
+    points = plan.resonances(found.eigenvalues, parts)
+    assert len(points) == len(found.eigenvalues)
+    shares = []
+    for x, eigenvalue in zip(points, found.eigenvalues.tolist(), strict=True):
+        schedule = plan.schedule(x)
+        gaps = np.diff(schedule.switch_times[0])
+        odd = gaps * eigenvalue.imag / np.pi
+        np.testing.assert_allclose(odd, odd[0], rtol=1e-9)
+        assert odd[0] == pytest.approx(2 * round((odd[0] - 1) / 2) + 1, rel=1e-9)
+        moment = schedule.fly(model)["moment_x"]
+        shares.append(np.abs(moment).max() / found.bound[0])
+    # The one antisymmetric mode about x: 1 - exp(-sigma 200 s) = 0.94 of all there is.
+    assert sorted(shares)[-2] < 0.2 < 0.85 < max(shares) < 1
+
+
 def test_a_search_finds_no_flight_over_the_bound_in_small_motion():
     model, elastic = shipped("two_boom_3d")
     found = influence(elastic, torque=0.02, dwell=2.66)

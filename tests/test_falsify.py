@@ -65,6 +65,20 @@ def test_the_budget_is_kept_and_the_history_is_the_worst_so_far():
         assert np.all((np.array(asked) >= -1) & (np.array(asked) <= 2))
 
 
+def test_given_points_are_asked_first_and_the_worst_of_them_is_left_for_better():
+    f, centre = turned(3, 10.0)
+    starts = [np.full(3, -1.0), centre + 0.2, np.full(3, 1.0)]
+    found = falsify(
+        f, [(-1, 1)] * 3, evaluations=200, rng=np.random.default_rng(0), starts=starts
+    )  # fmt: skip
+    asked = np.maximum.accumulate([f(x) for x in starts])
+    np.testing.assert_allclose(found.history[:3], asked, rtol=1e-12)
+    assert found.history[-1] > asked[-1]
+    alone = falsify(f, [(-1, 1)] * 3, evaluations=2, rng=np.random.default_rng(0), starts=starts)
+    assert alone.evaluations == 2
+    np.testing.assert_allclose(alone.x, starts[1], rtol=1e-12)
+
+
 def test_the_same_seed_finds_the_same():
     f, _ = turned(4, 100.0)
     runs = [
