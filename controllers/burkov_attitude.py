@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from controllers.burkov_charts import body_charts, spin_charts
-from controllers.burkov_claims import PAPER, Start, Theorem, settling_time
+from controllers.burkov_claims import PAPER, Start, Theorem, unstable
 from controllers.burkov_energy import Body, body_terms, spin_terms
 from controllers.burkov_laws import BodyVectors, BodyVectorsAndRates, Spin
-from controllers.burkov_lyapunov import Vector, basin, spin_condition, spin_energy
+from controllers.burkov_lyapunov import Vector, attitudes, basin, spin_condition, spin_energy
 from controllers.gains import orthogonal_axes, positive_entries
 from controllers.velocity_filter import Hold, SampledLaw, sampled
 from spacecraft_sim.checks import positive
@@ -125,10 +125,6 @@ def body_vectors(
     if model is None:
         return law, ()
     goal = np.ravel(r)
-    body = RigidBody(inertia=model.inertia, vectors=("s2", "s3"))
-    state = np.concatenate([np.zeros(3), goal])
-    plant = linear_plant(body, state=state, torques=np.zeros(3), basis=body.tangent(state))
-
     terms = partial(body_terms, formula, model)
     law = replace(law, charts=body_charts(law, formula, terms, RATES))
 
@@ -149,10 +145,14 @@ def body_vectors(
         deviation=lambda y, om: math.dist(y[:6], goal),
         unit="",
     )
-    settling = settling_time(close(law, plant))
+    loops = [_pair_loop(law, model, a.signs, r) for a in attitudes(formula)]
+    others = tuple(
+        unstable(loop, "({}r2, {}r3)".format(*("+-"[sign < 0] for sign in a.signs)), a.energy)
+        for loop, a in zip(loops[1:], attitudes(formula)[1:], strict=True)
+    )
     return law, (
         theorem.falls(),
-        theorem.ends(accuracy=accuracy, settling=settling, entry=entry),
+        theorem.ends(accuracy=accuracy, loops=loops[:1], others=others, entry=entry),
         theorem.stays(
             reach=lambda start, work: math.sqrt(2 * (energy(*start) + work) / min(k2, k3))
         ),
@@ -206,7 +206,10 @@ def permanent_rotation(
     return law, (
         theorem.falls(),
         theorem.ends(
-            accuracy=accuracy, settling=settling_time(_loop(law, model, spin)), entry=entry
+            accuracy=accuracy,
+            loops=(_loop(law, model, spin),),
+            others=(_upside_down(law, model, spin, k),),
+            entry=entry,
         ),
         theorem.stays(reach=lambda start, work: math.sqrt(2 * (energy(*start) + work) / k)),
     )
@@ -248,7 +251,7 @@ def two_torques(
     formula = Spin(alpha=None, beta=beta, gamma=gamma, k=k, spin=_finite(spin=spin))
     condition = _required(formula, model, spin, "Theorem 5.4 as corrected")
     law = _spinning(formula, model, period, thrusters)
-    settling = max(settling_time(_loop(law, model, c)) for c in (0.0, spin))
+    loops = [_loop(law, model, c) for c in (0.0, spin)]
 
     def member(start: Start) -> float:  # V about the spin that the flight starts with
         _, _, z = start
@@ -272,7 +275,12 @@ def two_torques(
     printed = _spin_theorem("Theorem 5.4", law, (), energy)
     return law, (
         theorem.falls(),
-        theorem.ends(accuracy=accuracy, settling=settling, entry=entry),
+        theorem.ends(
+            accuracy=accuracy,
+            loops=loops,
+            others=tuple(_upside_down(law, model, c, k) for c in (0.0, spin)),
+            entry=entry,
+        ),
         theorem.stays(reach=reach, entry=slow, detail="V_c <= V_c(0) with c = p(0)"),
         printed.stays(
             reach=reach,
@@ -339,13 +347,28 @@ def _spin_theorem(
     )
 
 
-def _loop(law: SampledLaw, model: Body, c: float) -> Loop:
-    """The linear loop at s1 = e_x, p = c, without the spin where no torque acts on it."""
+def _pair_loop(
+    law: SampledLaw, model: Body, signs: tuple[int, int], r: tuple[Vector, Vector]
+) -> Loop:
+    """The linear loop at s2 = +-r2, s3 = +-r3."""
+    body = RigidBody(inertia=model.inertia, vectors=("s2", "s3"))
+    state = np.concatenate([np.zeros(3), np.repeat(signs, 3) * np.ravel(r)])
+    plant = linear_plant(body, state=state, torques=np.zeros(3), basis=body.tangent(state))
+    return close(law, plant)
+
+
+def _upside_down(law: SampledLaw, model: Body, c: float, k: float) -> Assumption:
+    """That s_x = -1, p = c is unstable."""
+    return unstable(_loop(law, model, c, side=-1), f"s_x = -1, p = {c:.6g} rad/s", 2 * k)
+
+
+def _loop(law: SampledLaw, model: Body, c: float, *, side: int = 1) -> Loop:
+    """The linear loop at s_x = side, p = c, without the spin where no torque acts on it."""
     body = RigidBody(inertia=model.inertia, vectors=("s1",))
     freedoms = [1, 2, 4, 5] if len(law.thrusters) == 2 else [0, 1, 2, 4, 5]
     plant = linear_plant(
         body,
-        state=np.array([c, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        state=np.array([c, 0.0, 0.0, side, 0.0, 0.0]),
         torques=np.zeros(3),
         basis=np.eye(6)[:, freedoms],
     )

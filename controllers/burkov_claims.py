@@ -21,6 +21,7 @@ Array = np.ndarray
 Vector = Sequence[float] | Array
 PAPER = "Burkov 1998"
 WINDOW = 0.01  # over which V may not rise but for the hold, s
+_GROWING = 1e-9  # real part above which an eigenvalue of differences is positive, 1/s
 _NO_KICK = 1e-9  # share of the largest torque by which a delivered one may differ for rounding
 
 
@@ -130,14 +131,23 @@ class Theorem:
             f"V rises within {span} by no more than the hold does work", "V' <= 0", "J", rise
         )
 
-    def ends(self, *, accuracy: float, settling: float, entry: Entry = _anywhere) -> Guarantee:
-        """Returns the claim that a flight ends at the goal.
+    def ends(
+        self,
+        *,
+        accuracy: float,
+        loops: Sequence[Loop],
+        others: tuple[Assumption, ...] = (),
+        entry: Entry = _anywhere,
+    ) -> Guarantee:
+        """Returns the claim that a flight ends at the goal once the loop there has settled.
 
         Args:
             accuracy: Distance that is asked for, in `unit`.
-            settling: Time from which it is asked for, s.
+            loops: Linear loops at the goal, or at several of a family.
+            others: What is known of the other equilibria.
             entry: Takes the first sample to hypotheses on it.
         """
+        settling = max(map(settling_time, loops))
 
         def end(flown: Samples, trajectory: Trajectory) -> Measurement:
             last = len(flown.time) - 1
@@ -153,7 +163,11 @@ class Theorem:
             return Measurement(distance, float(flown.time[last]), None, accuracy, hypotheses)
 
         return self._claim(
-            "distance from the goal in the end", "time from the linear loop", self.unit, end
+            "distance from the goal in the end",
+            "time from the linear loop",
+            self.unit,
+            end,
+            assumptions=(decaying(loops, self.law.period), *others),
         )
 
     def stays(
@@ -190,6 +204,8 @@ class Theorem:
         detail: str,
         unit: str,
         measure: Callable[[Samples, Trajectory], Measurement],
+        *,
+        assumptions: tuple[Assumption, ...] = (),
     ) -> Guarantee:
         def measured(trajectory: Trajectory) -> Measurement:
             m = measure(samples(self.law, trajectory, self.moving), trajectory)
@@ -201,7 +217,7 @@ class Theorem:
             source=f"{self.source}; {detail}",
             unit=unit,
             measure=measured,
-            assumptions=self.assumptions,
+            assumptions=(*self.assumptions, *assumptions),
             signals=tuple(dict.fromkeys((*self.moving, *self.speeds))),
         )
 
@@ -248,3 +264,36 @@ def settling_time(loop: Loop) -> float:
     """
     slowest = max(x.real for x in loop.eigenvalues().tolist())
     return 20 / -slowest if slowest < 0 else math.inf
+
+
+def decaying(loops: Sequence[Loop], period: float) -> Assumption:
+    """Returns the hypothesis that a law is sampled often enough: its sampled loops decay.
+
+    Along a path that is more than it needs: there a loop may grow for some instants.
+
+    Args:
+        loops: Linear loops.
+        period: Sampling period, s.
+    """
+    return Assumption(
+        text=f"growth rate of the linear loop sampled every {period * 1e3:.6g} ms",
+        value=max(float(loop.growth(period)) for loop in loops),
+        limit=0.0,
+        unit="1/s",
+    )
+
+
+def unstable(loop: Loop, place: str, energy: float) -> Assumption:
+    """Returns the hypothesis that an equilibrium other than the goal is not stable.
+
+    Args:
+        loop: The linear loop there.
+        place: The equilibrium.
+        energy: V there, J.
+    """
+    return Assumption(
+        text=f"unstable directions at {place}, V = {energy:.6g} J",
+        value=int(np.sum(loop.eigenvalues().real > _GROWING)),
+        limit=1,
+        relation=">=",
+    )

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from controllers.burkov_charts import mechanism_charts
-from controllers.burkov_claims import PAPER, Start, Theorem, settling_time
+from controllers.burkov_claims import PAPER, Start, Theorem
 from controllers.burkov_energy import flexible_terms, position_terms
 from controllers.burkov_laws import Position
 from controllers.burkov_lyapunov import gravity_condition, rests
@@ -61,10 +61,11 @@ def position(
         The law and its guarantees.
 
     Raises:
-        ValueError: If a gain is not positive, or K1 + g_q(q_p) is not, with the value at fault.
+        ValueError: If a gain is not positive, or K1 + g_q(q_p) is not, with the value at fault, or
+            there are more or fewer of them than joints.
     """
     positive(accuracy=accuracy)
-    n = len(target)
+    n = len(target) if model is None else model.count
     if model is None and gravity != "none":
         raise ValueError(f'gravity = "{gravity}" needs a mechanism; without one set it to "none"')
     q_p = finite_entries("target", target, n)
@@ -95,9 +96,21 @@ def position(
             raise ValueError(f"outside the hypotheses of Theorem 2.2: {conditions[0]}")
         if gravity == "none":
             conditions += (_weightless(model, q_p),)
-        basin = min((rest.energy for rest in rests(formula, model)[1:]), default=math.inf)
+        if others := rests(formula, model)[1:]:
+            basin = others[0].energy
+            counts = ", ".join(str(rest.unstable) for rest in others)
+            conditions += (
+                Assumption(
+                    text=f"V at the lowest of {len(others)} other equilibria that were found, with "
+                    f"{counts} unstable directions",
+                    value=basin,
+                    limit=0.0,
+                    relation=">",
+                    unit="J",
+                ),
+            )
 
-    settling = settling_time(close(law, linear_mechanism(model, q=q_p)))
+    loop = close(law, linear_mechanism(model, q=q_p))
 
     terms = partial(position_terms, formula, model)
     law = replace(law, charts=mechanism_charts(law, terms, rates, rates))
@@ -121,11 +134,11 @@ def position(
         unit="rad",
     )
     if conditions:
-        ends = theorem.ends(accuracy=accuracy, settling=settling, entry=entry)
+        ends = theorem.ends(accuracy=accuracy, loops=(loop,), entry=entry)
         return law, (theorem.falls(), ends)
     least = float(np.linalg.eigvalsh(formula.K1)[0])
     stays = theorem.stays(reach=lambda start, work: math.sqrt(2 * (energy(*start) + work) / least))
-    return law, (theorem.falls(), theorem.ends(accuracy=accuracy, settling=settling), stays)
+    return law, (theorem.falls(), theorem.ends(accuracy=accuracy, loops=(loop,)), stays)
 
 
 def flexible_joint(
@@ -160,7 +173,7 @@ def flexible_joint(
         ValueError: If a gain is not positive, with its value.
     """
     positive(accuracy=accuracy)
-    n = len(target)
+    n = len(target) if model is None else model.links.count
     q_p = finite_entries("target", target, n)
     formula = Position(
         target=q_p,
@@ -187,7 +200,7 @@ def flexible_joint(
         float(np.linalg.eigvalsh([[K + k, -k], [-k, k]])[0])
         for K, k in zip(K0, model.stiffnesses, strict=True)
     )
-    settling = settling_time(close(law, linear_flexible(model, q=q_p)))
+    loop = close(law, linear_flexible(model, q=q_p))
 
     terms = partial(flexible_terms, formula, model)
     moving = (*links, *rates["link"], *rates["rotor"])
@@ -207,7 +220,7 @@ def flexible_joint(
         unit="rad",
     )
     stays = theorem.stays(reach=lambda start, work: math.sqrt(2 * (energy(*start) + work) / least))
-    return law, (theorem.falls(), theorem.ends(accuracy=accuracy, settling=settling), stays)
+    return law, (theorem.falls(), theorem.ends(accuracy=accuracy, loops=(loop,)), stays)
 
 
 def _weight(mechanism: Mechanism, q: Numbers) -> Numbers:

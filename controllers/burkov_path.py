@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.burkov_charts import path_charts
-from controllers.burkov_claims import PAPER, as_commanded
+from controllers.burkov_claims import PAPER, as_commanded, decaying
 from controllers.burkov_laws import Path
 from controllers.gains import Numbers, positive_entries
 from controllers.programmes import Harmonic, Return
@@ -168,11 +168,13 @@ def path(
         ValueError: If a gain is not positive, or there is no mechanism to feed forward from.
     """
     positive(gamma=gamma, nu=nu, kappa=kappa, blend=blend, accuracy=accuracy)
-    n = len(programme(0.0).q)
+    n = len(programme.mean)
     if feedforward and model is None:
         raise ValueError(
             "feedforward needs a mechanism; without one set feedforward = false, (3.7)"
         )
+    if model is not None and n != model.count:
+        raise ValueError(f"programme is of {n} joints; the machine has {model.count}")
     if not feedforward and kappa != 1:
         raise ValueError(f"kappa = {kappa:.6g}: (3.7), without feedforward, has kappa = 1")
     gains = {"K0": K0, "K1": K1, "K3": K3, "K4": K4}
@@ -281,7 +283,7 @@ def _claims(
         unit="rad",
         bound=_HIGHER_ORDER * bound,
         measure=late,
-        assumptions=(stable,),
+        assumptions=(stable, decaying(loops, law.period)),
     )
     return (claim,)
 

@@ -35,6 +35,11 @@ class CompiledMechanism:
     binary: bytes
     joints: tuple[str, ...]
 
+    @property
+    def count(self) -> int:
+        """How many joints there are, n."""
+        return len(self.joints)
+
     def gravity(self, q: Vector) -> Array:
         """Returns g(q), the torques that hold the mechanism still, shape (n,), N m.
 
@@ -172,7 +177,11 @@ def body(model: mujoco.MjModel) -> CompiledBody:
     """
     sites = [model.site(k).name for k in range(model.nsite)]
     if "principal" not in sites:
-        raise ValueError(choices("site", "principal", sites, where="the machine"))
+        raise ValueError(
+            f"the law needs a body '{mjcf.BUS}' with a site 'principal' along its principal axes; "
+            f"this machine has the joints {', '.join(_joints(model))} and "
+            f"{'the sites ' + ', '.join(sites) if sites else 'no site'}"
+        )
     bus = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, mjcf.BUS)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -25,6 +25,11 @@ Vector = Sequence[float] | Array
 class Mechanism(Protocol):
     """What a law may know of the mechanism that it drives."""
 
+    @property
+    def count(self) -> int:
+        """How many joints there are, n."""
+        ...
+
     def gravity(self, q: Vector) -> Array:
         """Returns g(q), the torques that hold the mechanism still, shape (n,), N m.
 
@@ -91,6 +96,11 @@ class PlanarArm:
         for name in ("lengths", "masses", "inertias"):
             positive(**{f"{name}[{k}]": x for k, x in enumerate(getattr(self, name))})
         positive(zero=True, g=self.g, **{f"centres[{k}]": x for k, x in enumerate(self.centres)})
+
+    @property
+    def count(self) -> int:
+        """How many joints there are, n."""
+        return len(self.masses)
 
     @property
     def inputs(self) -> tuple[str, ...]:

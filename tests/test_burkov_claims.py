@@ -55,8 +55,8 @@ CASES = {
         lambda: cases.position(gravity="at the target", period=8e-3),
         ARM, np.array([1.2, -0.5, 0.5, 0.5]), 9.0,
     ),
-    "(3.1)": (lambda: cases.path(period=8e-3), ARM, MOVING, 9.0),
-    "(3.7)": (lambda: cases.path(feedforward=False, period=8e-3), ARM, MOVING, 9.0),
+    "(3.1)": (lambda: cases.path(period=6e-3), ARM, MOVING, 9.0),
+    "(3.7)": (lambda: cases.path(feedforward=False, period=6e-3), ARM, MOVING, 9.0),
     "(4.2)": (lambda: cases.flexible(period=5e-3), FLEXIBLE, STRETCHED, 13.0),
     "(5.4)": (lambda: cases.vectors(rated=True, period=4e-2), BODY, near_the_goal(), 36.0),
     "(5.8)": (lambda: cases.vectors(rated=False, period=4e-2), BODY, near_the_goal(), 46.0),
@@ -192,6 +192,56 @@ def test_how_much_v_may_rise_between_samples(hold):
         V0 += np.repeat((1.0, 0.6), 3) @ (s - np.ravel(law.formula.r)) ** 2
         shares.append(verdict.measured / V0)
     assert 0 < max(shares) < 7e-5
+
+
+# -- what the design decides -------------------------------------------------------------------
+
+# Design by period, and the longest period that its loop bears, s; known to the digits shown.
+SLOWEST = {
+    "(2.1)": (cases.position, 32.5e-3),
+    "(2.4)": (lambda **x: cases.position(gravity="at the target", **x), 31.2e-3),
+    "(4.2)": (cases.flexible, 8.9e-3),
+    "(5.4)": (lambda **x: cases.vectors(rated=True, **x), 0.7695),
+    "(5.8)": (lambda **x: cases.vectors(rated=False, **x), 0.3747),
+    "(5.18)": (spin, 0.3102),
+    "(5.20)": (two, 0.6066),
+}
+
+
+@pytest.mark.parametrize("name", SLOWEST)
+def test_a_period_beyond_what_the_loop_bears_fails_a_hypothesis(name):
+    design, longest = SLOWEST[name]
+    for share, kept in ((0.99, True), (1.01, False)):
+        _, claims = design(period=share * longest)
+        (ends,) = (claim for claim in claims if "in the end" in claim.claim)
+        (sampled,) = (a for a in ends.assumptions if "growth rate" in a.text)
+        assert sampled.holds == kept
+
+
+def test_a_path_sampled_too_slowly_fails_a_hypothesis():
+    for period, kept in ((1e-3, True), (0.05, False)):
+        _, (claim,) = cases.path(period=period)
+        assert claim.assumptions[0].holds
+        assert claim.assumptions[1].holds == kept
+
+
+def test_other_equilibria_are_named_with_their_unstable_directions():
+    for rated in (True, False):
+        _, (_, ends, _) = cases.vectors(rated=rated)
+        others = [str(a) for a in ends.assumptions if "unstable" in a.text]
+        assert others == [
+            "unstable directions at (+r2, -r3), V = 2.4 J: 1 >= 1",
+            "unstable directions at (-r2, +r3), V = 4 J: 2 >= 1",
+            "unstable directions at (-r2, -r3), V = 6.4 J: 3 >= 1",
+        ]
+    _, (_, ends, _) = spin()
+    # Eigenvalues 0.608 +- 1.560j there.
+    assert str(ends.assumptions[-1]) == (
+        "unstable directions at s_x = -1, p = 2 rad/s, V = 3.2 J: 2 >= 1"
+    )
+    _, (_, ends) = cases.position(target=(0.0, 0.0), K1=(4.0, 4.0), gravity="at the target")
+    assert any("4 other equilibria that were found, with 0, 0, 1, 1" in a.text
+               for a in ends.assumptions)  # fmt: skip
 
 
 # -- what a flight must have -------------------------------------------------------------------

@@ -289,6 +289,13 @@ def test_bad_gains_are_named(changes, words):
         cases.position(**changes)
 
 
+def test_gains_of_another_arm_are_told():
+    with pytest.raises(ValueError, match="target has 1 entries; there must be 2"):
+        cases.position(target=(0.6,), K1=(80.0,), K2=(600.0,), K3=(20.0,))
+    with pytest.raises(ValueError, match="target has 2 entries; there must be 3"):
+        cases.flexible(target=(0.5, -0.8), K0=(40.0,) * 2, K2=(400.0,) * 2, K3=(20.0,) * 2)
+
+
 def test_a_stiffness_below_that_of_gravity_is_refused():
     with pytest.raises(ValueError, match=r"Theorem 2\.2: K1 \+ g_q\(q_p\) > 0.* not -1\.24"):
         upright(0.97 * CRITICAL)

@@ -79,7 +79,8 @@ def test_what_a_law_carries_is_a_value():
     [
         ("mechanism", "rigid_bus", r"joint_1 \.\. joint_n; this machine has bus"),
         ("flexible_mechanism", "arm2", r"rotors rotor_1 \.\.; this machine has joint_1"),
-        ("body", "arm2", "site 'principal'"),
+        ("body", "arm2", r"site 'principal' .* has the joints joint_1, joint_2 and no site"),
+        ("body", "rigid_bus", r"site 'principal' .* and the sites "),
     ],
 )
 def test_a_machine_of_another_kind_is_refused(build, name, says):
