@@ -17,7 +17,7 @@ from controllers.burkov_claims import PAPER, Start, Theorem, unstable
 from controllers.burkov_energy import Body, body_terms, spin_terms
 from controllers.burkov_laws import BodyVectors, BodyVectorsAndRates, Spin
 from controllers.burkov_lyapunov import Vector, attitudes, basin, spin_condition, spin_energy
-from controllers.gains import orthogonal_axes, positive_entries
+from controllers.gains import Numbers, orthogonal_axes, positive_entries
 from controllers.velocity_filter import Hold, SampledLaw, sampled
 from spacecraft_sim.checks import positive
 from spacecraft_sim.dynamics import linear_plant
@@ -348,7 +348,7 @@ def _spin_theorem(
 
 
 def _pair_loop(
-    law: SampledLaw, model: Body, signs: tuple[int, int], r: tuple[Vector, Vector]
+    law: SampledLaw, model: Body, signs: tuple[int, int], r: tuple[Numbers, Numbers]
 ) -> Loop:
     """The linear loop at s2 = +-r2, s3 = +-r3."""
     body = RigidBody(inertia=model.inertia, vectors=("s2", "s3"))

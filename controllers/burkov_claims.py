@@ -293,7 +293,7 @@ def unstable(loop: Loop, place: str, energy: float) -> Assumption:
     """
     return Assumption(
         text=f"unstable directions at {place}, V = {energy:.6g} J",
-        value=int(np.sum(loop.eigenvalues().real > _GROWING)),
+        value=sum(x.real > _GROWING for x in loop.eigenvalues().tolist()),
         limit=1,
         relation=">=",
     )

@@ -247,11 +247,16 @@ def assemble(scenario: Scenario, laws: Mapping[str, Design] = REGISTRY) -> Missi
         thrusters={"mujoco": Thrusters(machine.thrusters), "reduced": thrusters},
         disturbance=disturbance,
     )
-    for name in ("mujoco", "reduced"):  # start, sensors and what is claimed must exist on both
-        environment = mission.environment(name)
+    for kind in ("mujoco", "reduced"):  # start, sensors and what is claimed must exist on both
+        environment = mission.environment(kind)
+        needs = {f"the law {name} reads it": law.sensors}
+        needs |= {f"not the law but '{g.claim}' is judged by it": g.signals for g in guarantees}
+        for why, names in needs.items():
+            try:
+                environment.physics.select(names)
+            except ValueError as error:
+                raise ValueError(f"{scenario.name}: {error}; {why}") from error
         environment.reset()
-        for guarantee in mission.guarantees:
-            environment.physics.select(guarantee.signals)
     return mission
 
 
