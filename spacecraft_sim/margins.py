@@ -24,6 +24,7 @@ _KICK = 1e-6  # largest disturbance of an angle, rad, or a rate, rad/s
 _SHARES = (1.0, 0.5, 0.2, 0.1, 0.05)  # of the largest torque, to which it is limited
 _JUDGED = 1 / 3  # last share of a flight with relay thrusters, in which pulses are counted
 _NEWTON = 3  # rounds: from 1e-3 of the scale to rounding
+_GONE = 1e-7  # share of the largest deviation below which a motion has died out
 _CYCLES = 30  # of the critical oscillation in a flight
 _SEEN = 1e-6  # share of a motion in the readings, below which the law does not see it
 _SLOW = 0.02  # turn between samples below which a motion is taken for one without oscillation, rad
@@ -306,6 +307,8 @@ def _growth(settled: Settled, period: float, *, late: int = 0) -> float:
             return math.inf
     window = max(1, round(start.cycle / period))
     half = deviation[steps // 2 :]
+    if half.max() < _GONE * deviation.max():
+        return -math.inf  # rounding is left, which neither grows nor decays
     peaks = np.array([half[k : k + window].max() for k in range(0, len(half) - window, window)])
     if len(peaks) < 3 or not np.all(peaks > 0):
         return -math.inf

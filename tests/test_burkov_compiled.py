@@ -222,7 +222,8 @@ def test_a_spin_grows_or_decays_in_flight_as_its_poles_say(share, rate):
 )
 def test_an_upright_arm_falls_or_stays_as_its_poles_say(share, rate):
     flown = ready(
-        "burkov-position", 'controller.gravity="at the target"', f"controller.target=[{math.pi}, 0.0]", "controller.K1=[60.0, 30.0]",
+        "burkov-position", 'controller.gravity="at the target"',
+        f"controller.target=[{math.pi}, 0.0]", "controller.K1=[60.0, 30.0]",
     )  # fmt: skip
     law, rho = flown.controller, share * 46.21875
     law = replace(law, formula=replace(law.formula, K1=((rho, 0.0), (0.0, rho / 2))))

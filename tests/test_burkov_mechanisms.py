@@ -211,7 +211,7 @@ def test_torque_that_falls_short_of_gravity_does_not_hold(share, reached):
     law, _ = cases.position(target=target, period=1e-2)
     assert ARM.gravity(target) == pytest.approx([41.4, 7.14], abs=0.05)  # digits known
     largest = 9.81 * np.array([3.0 * 0.5 + 2.0 + 2.0 * 0.4, 2.0 * 0.4])  # of |g_i| anywhere
-    starts = random_starts(4, 2, math.pi, 0.0, seed=6)
+    starts = random_starts(8, 2, math.pi, 0.0, seed=6)
     for run in fly(
         ARM, law, starts=starts, duration=9.0, limits=share * largest, every=100, tolerance=1e-8
     ):

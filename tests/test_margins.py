@@ -68,6 +68,36 @@ def test_flights_show_the_same_margins(name):
         assert margin.flown == pytest.approx(margin.linear, rel=0.025)
 
 
+# What flights of another implementation show: scenario, settings, delay, period, ms; None where the
+# delay is that of another row.
+AS_FLOWN = {
+    "(2.1), held": ("burkov-position", ('controller.hold="zero-order hold"',), None, 25.9),
+    "(2.1), Euler": ("burkov-position", ('controller.hold="euler"',), None, 36.8),
+    "(2.1)": ("burkov-position", (), 17.2, 32.5),
+    "(2.4)": ("burkov-position", ('controller.gravity="at the target"',), 16.5, 31.3),
+    "(3.1)": ("burkov-path", SETTINGS["burkov-path"], 7.0, 13.7),
+    "(4.2)": ("burkov-flexible-joint", (), 4.5, 8.9),
+    "(5.4)": ("burkov-body-vectors-rates", (), 328.0, 772.5),
+    "(5.8), held": ("burkov-body-vectors", ('controller.hold="zero-order hold"',), None, 273.4),
+    "(5.8), Euler": ("burkov-body-vectors", ('controller.hold="euler"',), None, 340.4),
+    "(5.8)": ("burkov-body-vectors", (), 220.0, 375.0),
+    "(5.18)": ("burkov-permanent-rotation", (), 151.0, 310.4),
+    "(5.20)": ("burkov-two-torques", SETTINGS["burkov-two-torques"], 282.0, 607.1),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", AS_FLOWN)
+def test_flights_show_the_margins_that_other_flights_show(row):
+    name, settings, delay, period = AS_FLOWN[row]
+    settled = margins.settle(mission.assemble(mission.load_scenario(name, settings)))
+    first, *others = margins.margins(settled)
+    if delay:
+        assert 1e3 * first.flown == pytest.approx(delay, rel=0.03)
+    (found,) = (m.flown for m in others if not math.isnan(m.flown))
+    assert 1e3 * found == pytest.approx(period, rel=0.03)
+
+
 def test_seven_links_bear_little_delay():
     # Reference for gains of its own: eigenvalue -4.28 1/s, delay 1.3 ms, periods 2.6 and 2.7 ms.
     ready = mission.assemble(mission.load_scenario("burkov-position-7r"))
