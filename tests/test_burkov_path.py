@@ -178,7 +178,7 @@ def test_the_way_back_is_consistent_with_its_derivatives(deviation, rate, share)
     assert (after[:2] - before[:2]) / (2 * h) == pytest.approx(now[1:], abs=1e-6)
 
 
-@pytest.mark.parametrize("x", [(2.5, 0.0), (1.5, -2.0)])
+@pytest.mark.parametrize("x", [(-2.5, 0.0), (2.5, 0.0), (1.5, -2.0)])
 def test_a_new_path_spares_the_motors(x):
     peaks, ends = [], []
     for above in (None, 0.5):
@@ -187,9 +187,11 @@ def test_a_new_path_spares_the_motors(x):
         peaks.append([np.max(np.abs(run[f"motor_{k}"])) for k in (1, 2)])
         ends.append(np.max(np.abs(deviations(run)[-1])))
     # gamma K0 |x| pulls at first on the old path; the new one asks for the torque of a motion.
-    assert peaks[0][0] == pytest.approx(200 * x[0], rel=1e-3)
+    assert peaks[0][0] == pytest.approx(200 * abs(x[0]), rel=1e-3)
     assert peaks[1][0] < 0.17 * peaks[0][0]
     assert peaks[1][1] < 0.1 * peaks[0][1]
+    if x == (-2.5, 0.0):  # known of a start as far off: 34.7 and 6.2 N m; half a N m for its way
+        assert peaks[1] == pytest.approx([34.7, 6.2], abs=0.6)
     assert max(ends) < 2e-3  # what the hold leaves
 
 
