@@ -280,7 +280,7 @@ def _or_inf(p0: Regulator, F: float, e: float) -> float:
 
 def _decay(elastic: ElasticModel, found: Influence, k: int) -> float:
     """Decay of the mode with the largest part in the moment about the axis, rung up."""
-    decays = -found.modes.eigenvalues.real
+    decays = -np.real(found.modes.eigenvalues)
     parts = np.abs(found.modes.accelerations(elastic.H[k])[:, 0])
     built = (parts / -np.expm1(-np.outer(decays, found.dwell))) @ found.torque
     return float(decays[int(np.argmax(built))])
