@@ -166,7 +166,8 @@ def panel(axes: Axes, title: str, x: str = "", y: str = "", below: bool = False)
         deep = (0.45 if x else 0.19) * DPI / axes.get_window_extent().height  # under the ticks
         place = {"loc": "upper left", "bbox_to_anchor": (0, -deep)} if below else {}
         place = place or {"loc": "lower right", "bbox_to_anchor": (1.01, 0.985)}
-        columns = (4 if x else 6) if below else len(handles)
+        rows = math.ceil(len(handles) / (4 if x else 6)) if below else 1
+        columns = math.ceil(len(handles) / rows)  # rows of one length
         look = {"fontsize": 8.5, "frameon": False, "borderpad": 0.2}
         if not x:  # a narrow panel
             look |= {"handlelength": 1.0, "columnspacing": 0.9, "handletextpad": 0.4}
