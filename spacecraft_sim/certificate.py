@@ -155,7 +155,7 @@ def certify(
         )
         for k, name in enumerate(AXES)
     }
-    sway = [found.bending_rate(row) for row in elastic.G.T]
+    sway = found.bending_rates(elastic.G.T).tolist()
     quasi = {
         name: replace(axis, disturbance=float(products[k]), lean=float(lean[k]), sway=sway[k])
         for k, (name, axis) in enumerate(full.items())
@@ -240,16 +240,13 @@ def _of_acceleration(elastic: ElasticModel) -> ElasticModel:
 
 def _deflections(elastic: ElasticModel, found: Influence, M1: Array) -> Array:
     """Bounds of |q|: about rest, and from rest to where the constant disturbance holds it."""
-    swings = [
-        min(found.deflection(row), found.deflection_l1(row)) for row in np.eye(len(elastic.D))
-    ]
-    return np.array(swings) + np.abs(found.modes.deflection @ M1)
+    return found.deflections(np.eye(len(elastic.D))) + np.abs(found.modes.deflection @ M1)
 
 
 def _leans(elastic: ElasticModel, found: Influence, M1: Array) -> Array:
     """Bounds of (J^-1 H q)_e, rad: how far the attitude is from the quasi-rigid angle."""
-    swings = [min(found.deflection(row), found.deflection_l1(row)) for row in elastic.G.T]
-    return np.array(swings) + np.abs(elastic.G.T @ found.modes.deflection @ M1)
+    leans = elastic.G.T
+    return found.deflections(leans) + np.abs(leans @ found.modes.deflection @ M1)
 
 
 def _bands(axes: Mapping[str, RelayAxis]) -> dict[str, Band | None]:

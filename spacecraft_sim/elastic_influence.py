@@ -99,19 +99,27 @@ class Influence:
         swing = self._row(direction) @ self.modes.residues  # (k, 3); q = 0 at the step
         return float(total_variation(self.modes.eigenvalues, swing) @ self.torque)
 
-    def bending_rate(self, direction: Array | list[float]) -> float:
-        """Returns the smaller bound of |(direction, q')|, rad/s or m/s.
+    def deflections(self, rows: Array) -> Array:
+        """Returns the smaller bound of |(row, q)| for each row, shape (m,), rad or m.
 
         Args:
-            direction: l, coefficients of the elastic coordinates, shape (n,).
+            rows: Coefficients of the elastic coordinates, shape (m, n).
+        """
+        swings = rows @ self.modes.residues  # (k, m, 3)
+        leans = np.abs(rows @ self.modes.deflection) @ self.torque
+        printed = _printed(self.modes.eigenvalues, swings, self.torque, self.dwell) + leans
+        return np.minimum(printed, total_variation(self.modes.eigenvalues, swings) @ self.torque)
 
-        Raises:
-            ValueError: If the direction has another number of coefficients.
+    def bending_rates(self, rows: Array) -> Array:
+        """Returns the smaller bound of |(row, q')| for each row, shape (m,), rad/s or m/s.
+
+        Args:
+            rows: Coefficients of the elastic coordinates, shape (m, n).
         """
         eigenvalues = self.modes.eigenvalues
-        swing = eigenvalues[:, None] * (self._row(direction) @ self.modes.residues)  # (k, 3)
-        printed = _printed(eigenvalues, swing, self.torque, self.dwell)
-        return float(min(printed, total_variation(eigenvalues, swing) @ self.torque))
+        swings = eigenvalues[:, None, None] * (rows @ self.modes.residues)  # (k, m, 3)
+        printed = _printed(eigenvalues, swings, self.torque, self.dwell)
+        return np.minimum(printed, total_variation(eigenvalues, swings) @ self.torque)
 
     def _row(self, direction: Array | list[float]) -> Array:
         row, n = np.asarray(direction, dtype=float), len(self.modes.deflection)
