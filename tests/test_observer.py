@@ -53,6 +53,32 @@ def test_error_stays_within_its_bound():
     assert bounds.error[0] < 0.007 / 4  # and says something: a quarter of eps
 
 
+def test_the_bound_of_the_error_is_nearly_attained():
+    ready = mission.assemble(mission.load_scenario("sokolov-estimated"))
+    channels = [law.thrusters[0] for law in ready.controller.law.laws]
+    w, noise = 1e-4, 1e-8
+    observer, bounds = design_observer(
+        ready.reduced.model, None, channels=tuple(channels),
+        sensors=ready.controller.sensors, fed=ready.controller.law.sensors, period=0.05,
+        unknown=Unknown(thrust=(w,) * 3, impulse=(0.0,) * 3, noise=(noise,) * 3, steady=(0.0,) * 3),
+    )  # fmt: skip
+    settle = np.eye(len(observer.step)) - observer.gain @ observer.C
+    # A thrust held over each period and noise at each sample, of the signs that add up.
+    driven = np.hstack([settle @ observer.after * w, observer.gain * noise])
+    attained, jump, term = np.zeros(6), np.zeros(3), driven
+    for _ in range(4000):
+        attained += np.abs(observer.fed @ term).sum(axis=1)
+        jump += np.abs(observer.C @ observer.step @ term).sum(axis=1)
+        term = settle @ observer.step @ term
+    assert np.abs(term).max() < 1e-9 * np.abs(driven).max()
+    # The bound lets an impulse fall anywhere within a period, on each state as it likes.
+    assert np.all(attained <= bounds.error)
+    assert np.all(attained > 0.5 * bounds.error)
+    corrections = np.abs(observer.fed @ observer.gain) @ (jump + noise) / 0.05
+    assert np.all(corrections <= bounds.jumps)
+    assert np.all(corrections > 0.5 * bounds.jumps)
+
+
 def test_pending_thrust_is_accounted_for():
     # An observer that believes in another delay is off by more than its bound for this one.
     _, track = flown("initial.boom_amplitude=0.0")
