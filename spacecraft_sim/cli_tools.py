@@ -207,8 +207,15 @@ def certify(arguments: argparse.Namespace) -> int:
     """
     require_supported_mujoco()
     from controllers.contour import guaranteed_accuracy
-    from spacecraft_sim import certificate_curves, certificate_input, certificate_report, run_folder
+    from spacecraft_sim import (
+        attack_search,
+        certificate_curves,
+        certificate_input,
+        certificate_report,
+        run_folder,
+    )
     from spacecraft_sim.certificate import certify as certified
+    from spacecraft_sim.elastic_influence import influence
     from spacecraft_sim.elastic_mjcf import elastic_model, with_elastic_masses
 
     craft = certificate_input.read(
@@ -225,29 +232,26 @@ def certify(arguments: argparse.Namespace) -> int:
         regulators={"thrust against M1 alone, Ivanova & Sokolov": guaranteed_accuracy},
         lighter=lambda factor: elastic_model(with_elastic_masses(craft.model, factor)),
     )
-    folder = run_folder.create(arguments.out, f"certificate-{craft.name}")
-    curves = certificate_curves.curves(craft.model, elastic, torque=craft.torque, dwell=craft.dwell)
     attacks = {}
     if arguments.attack:
-        from spacecraft_sim.attack_search import attack
-        from spacecraft_sim.elastic_influence import influence
-
         found = influence(elastic, torque=craft.torque, dwell=craft.dwell)
-        attacks = attack(craft.model, elastic, found, evaluations=arguments.attack)
+        attacks = attack_search.attack(craft.model, elastic, found, evaluations=arguments.attack)
+    curves = certificate_curves.curves(craft.model, elastic, torque=craft.torque, dwell=craft.dwell)
+    folder = run_folder.create(arguments.out, f"certificate-{craft.name}")
     certificate_report.write(folder, craft, certificates, curves, attacks)
     console = terminal.console()
     table = Table("", "x", "y", "z", title=f"{craft.name}: {craft.title}", box=None)
     terminal.fill(table, certificate_report.rows(certificates, curves))
     console.print(table)
-    for line in certificate_report.explanations(certificates):
-        console.print(line, highlight=False)
-    console.print("[bold]assumptions[/]")
-    for line in certificate_report.assumptions(certificates):
-        console.print(f"  {line}", highlight=False)
-    if attacks:
-        console.print("[bold]attacked[/]")
-    for line in certificate_report.attacked(attacks, arguments.attack):
-        console.print(f"  {line}", highlight=False)
+    for heading, lines in (
+        ("", certificate_report.explanations(certificates)),
+        ("assumptions", certificate_report.assumptions(certificates)),
+        ("attacked", certificate_report.attacked(attacks, arguments.attack)),
+    ):
+        if heading and lines:
+            console.print(f"[bold]{heading}[/]")
+        for line in lines:
+            console.print(f"  {line}" if heading else line, highlight=False)
     console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
     broken = any(not v.holds and not v.failed for v in attacks.values())
     return HOLDS if all(c.holds for c in certificates) and not broken else FAILS

@@ -89,6 +89,7 @@ def test_a_certificate_can_be_attacked(tmp_path, capsys):
         assert f"{axis}: the worst of 12 flights reaches {verdict['measured']:.6g} N m" in shown
     assert certify(tmp_path / "b", "two_boom_3d", "--attack", "-3") == 2
     assert "evaluations = -3 must be >= 1" in capsys.readouterr().err
+    assert not (tmp_path / "b").exists()
 
 
 @slow
