@@ -217,17 +217,6 @@ def cross(a: Array, b: Array) -> Array:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def view(drawing: Drawing) -> tuple[str, list[int]]:
-    """Returns whence a picture is seen, and the axes to the right, up and in depth.
-
-    Machines with a bus are seen from +z, arms, which hang, from -y.
-
-    Args:
-        drawing: Shapes and motion.
-    """
-    return ("+z", [0, 1, 2]) if "bus" in drawing.positions else ("-y", [0, 2, 1])
-
-
 def channel_units(trajectory: Trajectory, drawing: Drawing) -> dict[str, str]:
     """Returns the thruster channels of a flight with their units: the jets tell N from N m.
 
