@@ -193,6 +193,18 @@ def test_switchings_at_half_periods_ring_each_mode_up():
     assert sorted(shares)[-2] < 0.2 < 0.85 < max(shares) < 1
 
 
+def test_channels_start_in_the_senses_in_which_they_add_up():
+    plan = Plan(
+        torque=np.ones(3), dwell=np.ones(3), wait=6.0, knots=2, duration=20.0,
+        disturbance=0.0, spin=0.0,
+    )  # fmt: skip
+    eigenvalues = np.array([-0.1 + 1j, -0.1 + 2j, -1.0])
+    parts = np.array([[1, -2, 0.5], [1j, 2j, -1j], [1, 1, 1]])
+    points = plan.resonances(eigenvalues, parts)
+    senses = [np.sign([level[0] for level in plan.schedule(x).levels]).tolist() for x in points]
+    assert senses == [[-1, 1, -1], [1, 1, -1]]  # the real eigenvalue does not ring
+
+
 def test_a_search_finds_no_flight_over_the_bound_in_small_motion():
     model, elastic = shipped("two_boom_3d")
     found = influence(elastic, torque=0.02, dwell=2.66)

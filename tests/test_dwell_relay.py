@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from relatives import generator, relative
+from relatives import generator, relative, shipped
 
+from controllers.axis import torque_gain
 from controllers.channels import Channels
 from controllers.dwell_relay import design
+from controllers.observer import Unknown, design_observer
 from spacecraft_sim import mission
 from spacecraft_sim.certificate import certify
+from spacecraft_sim.dwell_axes import RelayAxis, coupled
 from spacecraft_sim.scenario import Scenario
 from spacecraft_sim.trajectory import sample_rows
 
@@ -173,6 +176,64 @@ def test_what_is_measured_or_estimated_costs_lean_and_corrections():
         assembled("sokolov-quasi-rigid", *vacuous, "controller.disturbance=[0.4148, 0.0, 0.4336]")
     for axis, guarantee in estimated.items():
         assert measured[axis].bound < guarantee.bound < 1.2 * measured[axis].bound
+
+
+def test_what_an_observer_costs_is_in_the_bound():
+    ready = assembled("sokolov-estimated")
+    settings, T, axes = ready.scenario.controller, 0.05, "xyz"
+    model, laws = ready.reduced.model, ready.controller.law.laws
+    units = [
+        model.gain(x.thrusters[0], f"quasi_rigid_rate_{a}") for a, x in zip(axes, laws, strict=True)
+    ]
+    told = [torque_gain(model, a) / unit for a, unit in zip(axes, units, strict=True)]
+    _, found = design_observer(
+        model, ready.thrusters["reduced"], channels=ready.controller.thrusters,
+        sensors=ready.controller.sensors, fed=ready.controller.law.sensors, period=T,
+        unknown=Unknown(
+            thrust=tuple(np.array(told) * settings["disturbance"]), impulse=(0.0,) * 3,
+            noise=(1e-8,) * 3, steady=(0.0,) * 3,
+        ),
+    )  # fmt: skip
+    relays = {}
+    for k, (axis, law) in enumerate(zip(axes, laws, strict=True)):
+        (error, rate), (slip, push) = (x[2 * k : 2 * k + 2] for x in (found.error, found.jumps))
+        u0 = law.level * units[k]
+        relays[axis] = RelayAxis(
+            acceleration=u0,
+            inertia=1 / torque_gain(model, axis),
+            dwell=law.dwell,
+            disturbance=push / u0,
+            late=T,
+            slip=slip,
+            # Between two samples errors go on growing.
+            lean=settings["lean"][k] + error + T * (rate + slip),
+            sway=settings["sway"][k] + rate + T * push,
+        )
+    for axis, band in coupled(relays).items():
+        claimed = attitude_claims(ready)[axis].bound
+        assert claimed == pytest.approx(band.accuracy.total, rel=2e-6)  # rounding is allowed for
+        without = dataclasses.replace(
+            relays[axis], slip=0.0, lean=settings["lean"]["xyz".index(axis)]
+        )
+        assert claimed > 1.0003 * coupled({axis: without})[axis].accuracy.total
+
+
+def test_the_thrusters_of_other_axes_disturb_by_products_of_inertia():
+    table = {
+        "name": "coupled",
+        "title": "a bus whose axes products of inertia couple",
+        "spacecraft": "asymmetric_booms",
+        "duration": 1.0,
+        "controller": {"law": "dwell_relay", "axes": ("x", "y", "z"), "feedback": "quasi_rigid"},
+        "reduced": {"source": "mjcf", "modes": 2},
+    }
+    ready = mission.assemble(Scenario.model_validate(table))
+    inverse = np.linalg.inv(shipped("asymmetric_booms")[1].J)
+    for k, law in enumerate(ready.controller.laws):
+        # Equal torques on all axes: what the others do, over the own, here a thousandth.
+        e = (np.abs(inverse[k]).sum() - inverse[k, k]) / inverse[k, k]
+        room = 1 - law.brake / (0.02 * inverse[k, k])
+        assert e <= room * (1 + 1e-9) < 1.01 * e  # a little is gyroscopic
 
 
 def test_the_estimate_follows_the_quasi_rigid_angle_from_the_attitude_alone():
