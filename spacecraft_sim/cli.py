@@ -196,8 +196,7 @@ def _run(arguments: argparse.Namespace) -> int:
         subject = run_folder.subject(mission)
         with record.Recording(subject, folder / "recording.rrd", address) as recording:
             predicted = _fly(mission, "reduced")
-            below = beneath.reduced(subject, predicted, factor)
-            recording.expect(below)
+            recording.expect(beneath.reduced(subject, predicted, factor))
             measured = _fly(mission, "mujoco", recording.take)
             run_folder.write_flights(folder, mission.scenario, measured, predicted)
             for flight in (measured, predicted):
@@ -207,13 +206,9 @@ def _run(arguments: argparse.Namespace) -> int:
                     return BROKEN
             comparison = mission.judge(measured, predicted)
             recording.conclude(comparison.verdicts)
-        if recording.lost_viewer and recording.lost_file:  # a frozen viewer holds up the file too
-            recording.lost_file = None
-            path = folder / "recording.rrd"
-            path.unlink()
-            record.write(path, subject, measured, below, comparison.verdicts)
-        run_folder.write_verdicts(folder, mission, comparison)
-        run_folder.write_pictures(folder, mission, measured, predicted, comparison)
+            # While the recording is written to its end.
+            run_folder.write_verdicts(folder, mission, comparison)
+            run_folder.write_pictures(folder, mission, measured, predicted, comparison)
     except OSError as error:
         print(f"spacecraft-sim: {folder} cannot be written to its end: {error}", file=sys.stderr)
         return BROKEN

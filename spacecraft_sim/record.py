@@ -8,12 +8,10 @@ calls write a file, an open viewer, or both, in chunks; after each the file read
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from threading import Thread
 from types import TracebackType
 from uuid import uuid4
 
 import numpy as np
-import rerun as rr
 
 from spacecraft_sim import (
     record_chart,
@@ -39,11 +37,11 @@ from spacecraft_sim.frames import (
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.mjcf import BUS
 from spacecraft_sim.record_layout import Layout, blueprint
+from spacecraft_sim.record_stream import Outlet, Stream, rr
 from spacecraft_sim.signal_groups import groups
 from spacecraft_sim.trajectory import Trajectory, selected
 
 APPLICATION = "spacecraft_sim"
-PATIENCE = 5.0  # how long file and viewer may take for a chunk before the run goes on without, s
 CHUNK = 1000  # rows of a flight that is over
 Nozzles = dict[str, list[record_scene.Nozzle]]
 LOOKS = 60  # instants of a flight at which it is looked how far an arm reaches
@@ -87,8 +85,8 @@ class Recording:
     """A recording that is being written; use it in a `with` statement, which completes the file.
 
     Attributes:
-        lost_viewer: Why the viewer no longer gets the data; None while it does.
-        lost_file: Why the file no longer gets the data; None while it does.
+        lost_viewer: Why the viewer did not get all of it, once it is closed; None if it did.
+        lost_file: Why the file did not, likewise.
     """
 
     def __init__(self, subject: Subject, path: Path | None, viewer: str | None = None):
@@ -104,22 +102,22 @@ class Recording:
         """
         self.lost_viewer: str | None = None
         self.lost_file: str | None = None
-        self._subject, self._path, self._viewer, self._patience = subject, path, viewer, PATIENCE
-        self._stream = stream = rr.RecordingStream(APPLICATION, recording_id=uuid4())
-        sinks = [rr.FileSink(path)] if path else []
-        sinks += [rr.GrpcSink(viewer)] if viewer else []
-        if path:
-            _make_sure_of_room(path.with_suffix(".room"))
-        stream.set_sinks(*sinks)
-        stream.send_recording_name(subject.title)
+        self._subject, self._path = subject, path
         self._rest = at_rest(subject.model, subject.machine)
         self._bodies = drawn_bodies(self._rest)
         self._shown = 0  # rows of the flight beneath
         self._last: dict[str, dict[str, float]] = {}  # signals in the last row, by flight
+        if path:
+            _make_sure_of_room(path.with_suffix(".room"))
+        name = str(uuid4())
+        self._file = Outlet(APPLICATION, name, rr.FileSink(str(path.absolute()))) if path else None
+        self._viewer = Outlet(APPLICATION, name, rr.GrpcSink(viewer)) if viewer else None
+        self._stream = stream = Stream([o for o in (self._file, self._viewer) if o])
+        stream.send_recording_name(subject.title)
         self._document("scenario", record_text.scenario_page(subject.scenario))
         self._document("verdicts", record_text.unjudged_page(subject.title, ()))
         record_scene.setting(stream, self._rest)
-        self._flush()
+        stream.flush()
 
     def __enter__(self) -> "Recording":
         return self
@@ -130,16 +128,12 @@ class Recording:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._flush()
-        # It writes the footer of the file, and waits for ever for a disk that was full.
-        closing = Thread(target=self._stream.disconnect, daemon=True)
-        closing.start()
-        closing.join(4 * PATIENCE)
-        if closing.is_alive():
-            self._lose(f"not closed within {4 * PATIENCE:g} s")
-            rr.unregister_shutdown()  # at the end of the process it would wait again
-        if self._path and not self.lost_file and not _whole(self._path):
-            self.lost_file = f"{self._path}: {UNFINISHED} (it has no footer)"
+        self._stream.flush()
+        if self._viewer and (reason := self._viewer.close()):
+            self.lost_viewer = f"the viewer was lost: {reason}"
+        if self._file and self._path:
+            reason = self._file.close() or _unfinished(self._path)
+            self.lost_file = f"{self._path}: {UNFINISHED} ({reason})" if reason else None
 
     def expect(self, beneath: Beneath) -> None:
         """Takes the flight that is known beforehand, and lays out the views.
@@ -197,7 +191,7 @@ class Recording:
         record_signals.lane_styles(stream, beneath.channels, beneath.key, True)
         self._document("verdicts", record_text.unjudged_page(subject.title, beneath.notes))
         self._send_layout(middle, radius)
-        self._flush()
+        self._stream.flush()
 
     def take(self, part: Trajectory) -> None:
         """Logs rows of the flight on top, and those of the other up to there.
@@ -215,7 +209,7 @@ class Recording:
         self._end = float(part.time[-1])
         self._fill_bands(self._end)
         self._show_beneath(self._end)
-        self._flush()
+        self._stream.flush()
 
     def conclude(self, verdicts: Sequence[Verdict], page: str | None = None) -> None:
         """Logs what became of the claims; the flight has come to its end.
@@ -230,6 +224,7 @@ class Recording:
         record_signals.verdict_events(self._stream, verdicts, self._end)
         title, notes = self._subject.title, self._beneath.notes
         self._document("verdicts", page or record_text.verdict_page(title, verdicts, notes))
+        self._stream.flush()
 
     def stop(self, reason: str) -> None:
         """Logs why the flight ended before its time.
@@ -319,25 +314,11 @@ class Recording:
             drawn=bool(beneath.bodies),
             upright=BUS not in self._rest.positions,
         )
-        self._stream.send_blueprint(blueprint(layout, following=False))
+        self._stream.flush()
+        if self._file:
+            self._file.lay_out(blueprint(layout, following=False))
         if self._viewer:
-            self._flush()
-        if self._viewer and not self.lost_viewer:  # one that is frozen would stop the run
-            sending = Thread(target=self._send_following, args=(layout, self._viewer), daemon=True)
-            sending.start()
-            sending.join(PATIENCE)
-            if sending.is_alive():
-                self._lose(f"it takes no layout within {PATIENCE:g} s")
-
-    def _send_following(self, layout: Layout, viewer: str) -> None:
-        aside = rr.RecordingStream(APPLICATION, recording_id=self._stream.get_recording_id())
-        aside.connect_grpc(viewer)
-        aside.send_blueprint(blueprint(layout, following=True))
-        try:
-            aside.flush(timeout_sec=self._patience)
-        except RuntimeError as error:
-            self._lose(str(error))
-        aside.disconnect()
+            self._viewer.lay_out(blueprint(layout, following=True))
 
     def _acting(self) -> list[str]:
         """Channels that act in a flight that is known; all if none does."""
@@ -359,20 +340,6 @@ class Recording:
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
         self._stream.log(path, document, static=True)
 
-    def _flush(self) -> None:
-        """Brings all that was logged to file and viewer; neither stops the run if it is gone."""
-        try:
-            self._stream.flush(timeout_sec=self._patience)
-        except RuntimeError as error:
-            self._lose(str(error))
-            self._patience = 0.0
-
-    def _lose(self, reason: str) -> None:
-        if self._path and (not self._viewer or "File-writer" in reason):
-            self.lost_file = self.lost_file or f"{self._path}: {UNFINISHED} ({reason})"
-        else:
-            self.lost_viewer = self.lost_viewer or f"the viewer was lost: {reason}"
-
     def _root(self, key: str) -> str:
         return f"world/{key}"
 
@@ -385,8 +352,8 @@ def _make_sure_of_room(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _whole(path: Path) -> bool:
-    """Whether a file ends as one that was closed."""
+def _unfinished(path: Path) -> str | None:
+    """What a file lacks that was closed."""
     with path.open("rb") as file:
         file.seek(-len(_FOOTER) - 4, os.SEEK_END)
-        return file.read(len(_FOOTER)) == _FOOTER
+        return None if file.read(len(_FOOTER)) == _FOOTER else "it has no footer"

@@ -8,12 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import rerun as rr
-import rerun.blueprint as rrb
 
 from spacecraft_sim.chart import Charts, Line, Map, Portrait, portraits
 from spacecraft_sim.plane_lines import inside, pieces, spread
-from spacecraft_sim.record_scene import TIMELINE, Color, Stream
+from spacecraft_sim.record_scene import TIMELINE, Color
+from spacecraft_sim.record_stream import Stream, rr, rrb
 from spacecraft_sim.trajectory import Trajectory, between_rows, moving_axes
 
 Array = np.ndarray

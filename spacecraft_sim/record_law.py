@@ -5,14 +5,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import rerun as rr
-import rerun.blueprint as rrb
 
 from spacecraft_sim import sphere
 from spacecraft_sim.chart import Arrow, Curve, History, Sphere, floor, path_of
 from spacecraft_sim.record_chart import NIGHT, strips
-from spacecraft_sim.record_scene import TIMELINE, Color, Stream
+from spacecraft_sim.record_scene import TIMELINE, Color
 from spacecraft_sim.record_signals import CURVES, GREY
+from spacecraft_sim.record_stream import Stream, rr, rrb
 from spacecraft_sim.trajectory import Trajectory
 
 Array = np.ndarray

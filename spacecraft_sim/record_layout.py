@@ -5,14 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import rerun as rr
-import rerun.blueprint as rrb
 
 from spacecraft_sim.chart import Charts, History, Sphere
 from spacecraft_sim.record_chart import NIGHT, Plane, map_views, plane_views
 from spacecraft_sim.record_law import history_path, sphere_views
 from spacecraft_sim.record_scene import TIMELINE
 from spacecraft_sim.record_signals import band_path
+from spacecraft_sim.record_stream import rr, rrb
 from spacecraft_sim.signal_groups import Group
 
 NEAR = 8.0  # half-width of the plots that follow the cursor, s, or a tenth of the flight

@@ -4,15 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import rerun as rr
 
 from spacecraft_sim.changes import Changes, Channel
 from spacecraft_sim.drawing import Drawing, Shape, boom_points, turned
 from spacecraft_sim.frames import Frames
+from spacecraft_sim.record_stream import Stream, rr
 from spacecraft_sim.sketch import exhausts, surface
 
 Array = np.ndarray
-Stream = rr.RecordingStream
 Color = tuple[int, int, int]
 
 TIMELINE = "sim_time"

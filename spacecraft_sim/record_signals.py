@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import rerun as rr
 
 from spacecraft_sim.changes import BETWEEN, Changes, Channel, What
 from spacecraft_sim.guarantee import Verdict
-from spacecraft_sim.record_scene import BOOMS, TIMELINE, Color, Stream, throttle
+from spacecraft_sim.record_scene import BOOMS, TIMELINE, Color, throttle
+from spacecraft_sim.record_stream import Stream, rr
 from spacecraft_sim.signal_groups import Group
 from spacecraft_sim.trajectory import Trajectory
 

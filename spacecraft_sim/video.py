@@ -4,7 +4,6 @@ import math
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import IO
 
 import numpy as np
 
+from spacecraft_sim import child_process
 from spacecraft_sim.trajectory import Trajectory
 
 Progress = Callable[[int, int], None]  # frames done, frames in all
@@ -87,9 +87,8 @@ def start_renderer(backend: str, words: list[str], errors: IO[bytes]) -> subproc
         words: What to do.
         errors: File for what it complains of.
     """
-    environment = {**os.environ, "MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend}
-    command = [sys.executable, "-m", "spacecraft_sim.render", *words]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment)
+    environment = {"MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend}
+    return child_process.start("render", words, stderr=errors, environment=environment)
 
 
 def last_words(errors: IO[bytes]) -> str:

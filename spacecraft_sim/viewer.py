@@ -10,7 +10,7 @@ import time
 from collections.abc import Sequence
 
 # The viewer's program with its exit code, which `python -m rerun_cli` drops.
-RERUN = (sys.executable, "-c", "import sys, rerun_cli.__main__ as m; sys.exit(m.main())")
+RERUN = (sys.executable, "-P", "-c", "import sys, rerun_cli.__main__ as m; sys.exit(m.main())")
 PORT = 9876  # where a viewer listens unless told otherwise
 _SCHEME, _PATH = "rerun+http://", "/proxy"
 

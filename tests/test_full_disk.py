@@ -3,14 +3,27 @@
 A limit on the size of files stands for the full disk: writes fail alike, with another number.
 """
 
+import os
 import resource
+import signal
+import subprocess
 import threading
+import time
+from types import SimpleNamespace
 
 import pytest
-import rerun as rr
 import rrd
 
-from spacecraft_sim import beneath, cli, mission, record, run_folder
+from spacecraft_sim import (
+    beneath,
+    cli,
+    mission,
+    record,
+    record_stream,
+    recorder,
+    run_folder,
+    trajectory,
+)
 from spacecraft_sim.repair import repair
 
 NAME = "efremov-nonlocal"
@@ -26,9 +39,8 @@ def short():
 
 
 @pytest.fixture
-def limited(monkeypatch):
+def limited():
     """Sets the size that files may have at most, bytes."""
-    monkeypatch.setattr(record, "PATIENCE", 1.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
@@ -76,13 +88,65 @@ def test_a_disk_that_is_full_from_the_start_is_told_before_the_flight(limited, t
     assert not list(out.glob("*.room"))
 
 
-def test_a_recording_that_does_not_close_is_left(short, tmp_path, monkeypatch):
-    never, let_go = threading.Event(), []
-    monkeypatch.setattr(record, "PATIENCE", 0.05)
-    monkeypatch.setattr(rr.RecordingStream, "disconnect", lambda _: never.wait(60))
-    monkeypatch.setattr(rr, "unregister_shutdown", lambda: let_go.append(True))
-    with record.Recording(short[0], tmp_path / "recording.rrd") as recording:
-        pass
-    never.set()
-    assert "not closed within 0.2 s" in (recording.lost_file or "")
-    assert let_go == [True]
+@pytest.fixture
+def started(monkeypatch):
+    """The processes that write recordings, as they are started."""
+    found, popen = [], subprocess.Popen
+
+    def start(*words, **named):
+        found.append(popen(*words, **named))
+        return found[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    return found
+
+
+def test_a_process_that_hangs_holds_up_neither_the_flight_nor_the_end(
+    short, started, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(record_stream, "CLOSING", 0.2)
+    subject, measured, below = short
+    begun = time.monotonic()
+    with record.Recording(subject, tmp_path / "recording.rrd") as recording:
+        started[0].send_signal(signal.SIGSTOP)
+        recording.expect(below)
+        for _ in range(3):  # much more than the pipe holds
+            recording.take(measured)
+        recording.conclude(())
+    assert time.monotonic() - begun < 5.0
+    assert "nothing more was written for 0.2 s" in (recording.lost_file or "")
+    assert started[0].poll() == -signal.SIGKILL
+
+
+def test_a_process_that_is_slow_is_waited_for(short, started, tmp_path, monkeypatch):
+    monkeypatch.setattr(record_stream, "CLOSING", 3.0)
+    subject, measured, below = short
+    path = tmp_path / "recording.rrd"
+    with record.Recording(subject, path) as recording:
+        started[0].send_signal(signal.SIGSTOP)
+        recording.expect(below)
+        recording.take(measured)
+        threading.Timer(1.0, started[0].send_signal, [signal.SIGCONT]).start()
+    assert recording.lost_file is None
+    assert rrd.chunks(path)
+
+
+def test_a_process_that_dies_is_told_and_the_flight_goes_on(short, started, tmp_path):
+    subject, measured, below = short
+    with record.Recording(subject, tmp_path / "recording.rrd") as recording:
+        recording.expect(below)
+        recording.take(trajectory.selected(measured, slice(0, 50)))
+        started[0].kill()
+        started[0].wait()
+        for _ in range(3):
+            recording.take(trajectory.selected(measured, slice(50, None)))
+    assert "the process that writes it ended with -9" in (recording.lost_file or "")
+
+
+def test_a_file_that_does_not_close_is_given_up(monkeypatch, capfd):
+    ended = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+    monkeypatch.setattr(recorder, "CLOSING", 0.05)
+    recorder._close(SimpleNamespace(disconnect=lambda: time.sleep(0.5)))
+    assert ended == [1]
+    assert capfd.readouterr().out == "not closed within 0.05 s"

@@ -55,15 +55,7 @@ ONLY_IN = {
         "elastic_flight",
     },
     "dm_control": {"physics", "reduced", "equations", "task", "simulate"},
-    "rerun": {
-        "record",
-        "record_chart",
-        "record_law",
-        "record_layout",
-        "record_scene",
-        "record_signals",
-        "repair",
-    },
+    "rerun": {"recorder", "record_stream", "repair"},  # record_stream takes its types alone
     "matplotlib": {
         "plots",
         "plots_chart",

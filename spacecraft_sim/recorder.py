@@ -1,0 +1,52 @@
+"""Writes a recording to one place, in a process of its own: makes what it is told on its input.
+
+The first recipe is the stream; when the input ends, be it that the run is over or that it was
+killed, the recording is closed.  What prevents it is said on the output, with code 1.
+"""
+
+import os
+import signal
+import sys
+from threading import Timer
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from spacecraft_sim.recipe import made
+
+CLOSING = 20.0  # how long it may take to close, s; for a disk that was full it takes for ever
+
+
+def main() -> int:
+    """Returns the exit code."""
+    for kind in (signal.SIGINT, signal.SIGTERM):  # they are for the run
+        signal.signal(kind, signal.SIG_IGN)
+    rr.set_strict_mode(True)  # a mistake is an error, not a remark
+    told, names = sys.stdin.buffer, {"rr": rr, "rrb": rrb}
+    stream = names["stream"] = made(told, names)
+    try:
+        while True:
+            made(told, names)
+    except EOFError:
+        return _close(stream)
+    except RuntimeError as error:  # a flush: the disk is full, the viewer gone
+        return _give_up(str(error))
+
+
+def _close(stream: Any) -> int:
+    late = Timer(CLOSING, _give_up, [f"not closed within {CLOSING:g} s"])
+    late.daemon = True
+    late.start()
+    stream.disconnect()  # it writes the footer of a file
+    late.cancel()
+    return 0
+
+
+def _give_up(reason: str) -> int:
+    os.write(sys.stdout.fileno(), reason.encode())
+    os._exit(1)  # else rerun tries again at the end of the process, and may wait for ever
+
+
+if __name__ == "__main__":
+    sys.exit(main())
