@@ -101,7 +101,7 @@ def test_a_recipe_cut_anywhere_is_no_recipe():
             made(io.BytesIO(data[:size]), {"lib": Library})
 
 
-@pytest.mark.parametrize("value", [object(), {1, 2}, b"bytes", 1j, np.array([None])], ids=repr)
+@pytest.mark.parametrize("value", [object(), {1, 2}, b"bytes", 1j, np.array([None])], ids=type)
 def test_what_cannot_be_told_is_refused_at_once(value):
     with pytest.raises(TypeError, match="plain data and arrays of numbers, not"):
         Recipe("lib").Thing([value]).encoded()
