@@ -128,7 +128,7 @@ class Recording:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._stream.flush()
+        self._stream.end()
         if self._viewer and (reason := self._viewer.close()):
             self.lost_viewer = f"the viewer was lost: {reason}"
         if self._file and self._path:
@@ -212,7 +212,7 @@ class Recording:
         self._stream.flush()
 
     def conclude(self, verdicts: Sequence[Verdict], page: str | None = None) -> None:
-        """Logs what became of the claims; the flight has come to its end.
+        """Logs what became of the claims, and lets the recording close: nothing may follow.
 
         Args:
             verdicts: Of the flight on top.
@@ -224,7 +224,7 @@ class Recording:
         record_signals.verdict_events(self._stream, verdicts, self._end)
         title, notes = self._subject.title, self._beneath.notes
         self._document("verdicts", page or record_text.verdict_page(title, verdicts, notes))
-        self._stream.flush()
+        self._stream.end()
 
     def stop(self, reason: str) -> None:
         """Logs why the flight ended before its time.

@@ -65,13 +65,17 @@ class Outlet:
         """
         self.pass_on(_STREAM.send_blueprint(blueprint).encoded())
 
+    def end(self) -> None:
+        """Lets the process close the recording when all is written; returns at once."""
+        self._queue.put(None)
+
     def close(self) -> str | None:
-        """Waits until all is written.
+        """Waits until all is written and the recording closed.
 
         Returns:
             Why it is not; None if it is.
         """
-        self._queue.put(None)
+        self.end()
         ended = self._takes_all() and self._ends(CLOSING)
         if not ended:
             self.process.kill()
@@ -157,6 +161,13 @@ class Stream:
         for outlet in self._outlets:
             outlet.pass_on(recipes)
         self._told = []
+
+    def end(self) -> None:
+        """Lets the outlets close; nothing may be logged any more."""
+        if self._told:
+            self.flush()
+        for outlet in self._outlets:
+            outlet.end()
 
     def _tell(self, recipe: Recipe) -> None:
         self._told.append(recipe.encoded())
