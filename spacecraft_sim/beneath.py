@@ -8,7 +8,7 @@ import numpy as np
 
 from spacecraft_sim.changes import Channel
 from spacecraft_sim.chart import Charts
-from spacecraft_sim.drawing import Drawing, channel_units, sprung_joints
+from spacecraft_sim.drawing import Drawing, sprung_joints
 from spacecraft_sim.frames import (
     Frames,
     at_rest,
@@ -21,7 +21,7 @@ from spacecraft_sim.frames import (
 )
 from spacecraft_sim.mjcf import BUS
 from spacecraft_sim.spacecraft import Spacecraft
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, channel_units
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,18 +144,15 @@ def bent(model: Any, machine: Spacecraft, factor: float) -> str:
     return ""
 
 
-def channels(
-    flight: Trajectory, rest: Drawing, machine: Spacecraft, known: Sequence[Trajectory]
-) -> list[Channel]:
+def channels(flight: Trajectory, machine: Spacecraft, known: Sequence[Trajectory]) -> list[Channel]:
     """Returns the thruster channels of a flight.
 
     Args:
         flight: The flight, or a part of it.
-        rest: Its machine in the reference configuration.
         machine: The machine.
         known: Flights that say how large a thrust is to be expected.
     """
-    units, found = channel_units(flight, rest), []
+    units, found = channel_units(flight), []
     for thruster in machine.thrusters:
         if (name := thruster.name) in units:
             seen = [float(np.abs(f[name]).max()) for f in known if name in f.signals]

@@ -217,20 +217,6 @@ def cross(a: Array, b: Array) -> Array:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def channel_units(trajectory: Trajectory, drawing: Drawing) -> dict[str, str]:
-    """Returns the thruster channels of a flight with their units: the jets tell N from N m.
-
-    What drives a joint is a torque.
-
-    Args:
-        trajectory: The flight.
-        drawing: Its drawing.
-    """
-    names = [name for name in trajectory.signals if f"{name}_command" in trajectory.signals]
-    known = {jet.channel: "N" if np.any(jet.force) else "N m" for jet in drawing.jets}
-    return {name: known.get(name, "N m") for name in names}
-
-
 _KINDS = {
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",

@@ -121,6 +121,7 @@ class Mission:
             self.thrusters[plant],
             initial=self.scenario.initial,
             disturbance=self.disturbance,
+            input_units=self.mujoco.input_units,
             accuracy=self.accuracy or 1e-2,
             seed=self.scenario.seed,
         )

@@ -8,7 +8,7 @@ torques on the bus.
 # pyright: reportAttributeAccessIssue=false, reportMissingImports=false
 # (MuJoCo is a compiled module without type stubs)
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -97,6 +97,26 @@ def channels(spacecraft: Spacecraft, disturbances: Iterable[str]) -> dict[str, t
     """
     wiring = {thruster.name: motors(thruster) for thruster in spacecraft.thrusters}
     return wiring | {name: (name,) for name in disturbances}
+
+
+def input_units(model: mujoco.MjModel, wiring: Mapping[str, tuple[str, ...]]) -> dict[str, str]:
+    """Returns the units of inputs: N of those that push, N m of those that turn.
+
+    Args:
+        model: The compiled spacecraft.
+        wiring: The actuators of each input.
+    """
+    return {
+        name: "N" if any(_pushes(model, actuator) for actuator in actuators) else "N m"
+        for name, actuators in wiring.items()
+    }
+
+
+def _pushes(model: mujoco.MjModel, name: str) -> bool:
+    actuator = model.actuator(name)
+    if actuator.trntype[0] == mujoco.mjtTrn.mjTRN_SITE:
+        return bool(np.any(actuator.gear[:3]))
+    return model.jnt_type[actuator.trnid[0]] == mujoco.mjtJoint.mjJNT_SLIDE
 
 
 def compile(

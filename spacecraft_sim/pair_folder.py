@@ -24,7 +24,6 @@ def write(folder: Path, compared: Pair, factor: float | None) -> None:
         title=f"A: {names[0]},  B: {names[1]}",
         booms=[x.name for x in a.mission.machine.booms if x.name in _booms(b)],
         bands=(a.mission.bands, b.mission.bands),
-        units={**b.units, **a.units},
         table=run_pair.table(compared),
     )
     record_pair.write(folder / "recording.rrd", compared, factor)

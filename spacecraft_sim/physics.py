@@ -40,9 +40,11 @@ class MujocoPhysics(dm_mujoco.Physics):
 
     Attributes:
         inputs: Input names: thruster channels, then disturbances.
+        input_units: Their units.
     """
 
     inputs: tuple[str, ...]
+    input_units: dict[str, str]
     _value: Sequence[float]
     _slope: Sequence[float]
 
@@ -71,6 +73,7 @@ class MujocoPhysics(dm_mujoco.Physics):
     def _connect(self, spacecraft: Spacecraft, channels: dict[str, tuple[str, ...]]) -> None:
         model, data = self.model.ptr, self.data.ptr
         self.inputs = tuple(channels)
+        self.input_units = mjcf.input_units(model, channels)
         self._spacecraft = spacecraft
         self._readings = Readings(model, data)
         self.units = self._readings.units

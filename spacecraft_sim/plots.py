@@ -13,11 +13,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from spacecraft_sim import spans
-from spacecraft_sim.drawing import Drawing, channel_units
+from spacecraft_sim.drawing import Drawing
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.plots_film import BOOMS, INK, MINUS, PLUS, SOFT, film
 from spacecraft_sim.plots_table import BAD, GOOD, ROW, table
-from spacecraft_sim.trajectory import Trajectory, between_rows, moving_axes
+from spacecraft_sim.trajectory import Trajectory, between_rows, channel_units, moving_axes
 
 Array = np.ndarray
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
@@ -57,7 +57,7 @@ def summary(
         histories: Four panels in place of those of the quasi-rigid motion.
         law: Panels that the law asks for, in place of those of the end of the flight.
     """
-    channels, bands = channel_units(measured, drawing), bands or {}
+    channels, bands = channel_units(measured), bands or {}
     lanes = max(1.0, 0.42 * len(channels))  # inches
     claims = ROW * (len(verdicts) + 1)  # inches
     heights = [1.9, 2.3, 2.3, claims if histories else max(claims, 2 * lanes + 0.6)]

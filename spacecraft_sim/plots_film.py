@@ -8,10 +8,10 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.path import Path as Line
 
 from spacecraft_sim import sketch, spans
-from spacecraft_sim.drawing import Drawing, Jet, channel_units, turned
+from spacecraft_sim.drawing import Drawing, Jet, turned
 from spacecraft_sim.families import is_quasi_rigid
 from spacecraft_sim.sketch import View
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, channel_units
 
 Array = np.ndarray
 
@@ -122,7 +122,7 @@ def _arrows(
 ) -> str:
     """Draws the thrust as arrows, an arc for a torque; returns its figures."""
     row = int(np.searchsorted(measured.time, drawing.time[frame], side="right")) - 1
-    units = channel_units(measured, drawing)
+    units = channel_units(measured)
     peaks = {channel: float(np.abs(measured[channel]).max()) for channel in units}
     now = {channel: float(measured[channel][row]) for channel in units}
     now = {channel: level for channel, level in now.items() if abs(level) > LEAST * peaks[channel]}

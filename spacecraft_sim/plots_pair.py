@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from spacecraft_sim.plots import DPI, GOOD, INK, SOFT, WIDTH, panel, prefix
 from spacecraft_sim.signal_groups import Group, groups
-from spacecraft_sim.trajectory import Trajectory, moving_axes
+from spacecraft_sim.trajectory import Trajectory, channel_units, moving_axes
 
 Array = np.ndarray
 Named = tuple[tuple[str, Trajectory], tuple[str, Trajectory]]
@@ -34,7 +34,6 @@ def page(
     booms: Sequence[str],
     title: str,
     bands: tuple[Mapping[str, float], Mapping[str, float]],
-    units: Mapping[str, str],
     table: Table,
 ) -> None:
     """Draws two flights over each other, with the table of their differences.
@@ -46,7 +45,6 @@ def page(
         booms: Names of the booms of both.
         title: One line over the page.
         bands: Half-widths that signals of A and of B are to keep, by signal, rad.
-        units: Of the thruster channels.
         table: Headings, and below each rows of (what, A, B, B - A).
     """
     flights: Named = (("A", a), ("B", b))
@@ -59,7 +57,7 @@ def page(
     plane = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
     if all(name in flight.signals for name in plane for flight in (a, b)):
         panels += [partial(_phase_plane, flights=flights, names=plane, share=s) for s in (0.0, 0.9)]
-    panels += [partial(_thrust, flights=flights, units=units, share=share) for share in (0.0, 1.0)]
+    panels += [partial(_thrust, flights=flights, share=share) for share in (0.0, 1.0)]
     rows = -(-len(panels) // 2)
     lines = _lines(table)
     height = max(PANEL * rows + 0.6, LINE * (len(lines) + 1) + 1.1)
@@ -123,10 +121,10 @@ def _phase_plane(axes: Axes, *, flights: Named, names: tuple[str, str], share: f
     _key(axes)
 
 
-def _thrust(axes: Axes, *, flights: Named, units: Mapping[str, str], share: float) -> None:
+def _thrust(axes: Axes, *, flights: Named, share: float) -> None:
     """The first channels of both, as delivered, over the first or the last seconds."""
-    names = [n for _, f in flights for n in f.signals if f"{n}_command" in f.signals]
-    channels = [*dict.fromkeys(names)]
+    units = [channel_units(flight) for _, flight in flights]
+    channels = [*dict.fromkeys(name for found in units for name in found)]
     end = share * min(float(flight.time[-1]) for _, flight in flights)
     start = max(end - NEAR, 0.0)
     for (run, flight), (color, width) in zip(flights, RUNS, strict=True):
@@ -136,7 +134,7 @@ def _thrust(axes: Axes, *, flights: Named, units: Mapping[str, str], share: floa
             axes.step(flight.time, flight[channel], where="post", label=f"{run}: {channel}", **look)
     axes.set_xlim(start, start + NEAR)
     when = "to the end" if share else "from the start"
-    kinds = " or ".join(sorted({units[channel] for channel in channels}))
+    kinds = " or ".join(sorted({unit for found in units for unit in found.values()}))
     panel(axes, f"Thrust as delivered, {when}, {kinds}", "time, s")
     _key(axes)
 

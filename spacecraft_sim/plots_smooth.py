@@ -45,7 +45,7 @@ def _curves(title: str, names: Sequence[str], measured: Trajectory) -> Panel:
             label = None if zoom else words  # the panel above has the key
             axes.plot(flights[1].time, values, label=label, color=COLORS[k], linewidth=1.2)
         time_axis(axes, flights[1].time[0], flights[1].time[-1])
-        unit = "N m" if title == "Torques" else measured.units[names[0]] if names else ""
+        unit = measured.units[names[0]] if names else ""
         more = f"; {len(COLORS)} of {len(names)}" if len(names) > len(COLORS) else ""
         panel(axes, f"{title}, {f'{letter}{unit}' if unit else UNIT_VECTORS}{more}", below=True)
 

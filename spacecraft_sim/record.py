@@ -185,7 +185,7 @@ class Recording:
         record_chart.plane_frames(stream, self._planes, beneath.flight)
         record_chart.maps(stream, subject.charts)
         record_law.globes(stream, self._spheres)
-        self._channels = channels(beneath.flight, self._rest, subject.machine, known)
+        self._channels = channels(beneath.flight, subject.machine, known)
         both = bool(beneath.channels)
         record_signals.lane_styles(stream, self._channels, beneath.over_key if both else "", False)
         record_signals.lane_styles(stream, beneath.channels, beneath.key, True)
@@ -308,6 +308,7 @@ class Recording:
             bands=self._bands,
             relays=any(not channel.thruster.proportional for channel in self._channels),
             acting=self._acting(),
+            unit=" or ".join(sorted({c.unit for c in (*self._channels, *beneath.channels)})),
             duration=max(self._ends.values()),
             active=self._active(),
             booms=bool(self._rest.booms),

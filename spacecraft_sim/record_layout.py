@@ -42,6 +42,7 @@ class Layout:
         bands: Half-widths that signals are to keep, by signal, the widest first, rad.
         relays: Whether there are channels with levels.
         acting: Names of the channels whose thrust is shown: those that are known to act.
+        unit: Of their thrusts.
         upright: Whether the machine stands on the ground, to be seen from the side.
     """
 
@@ -62,6 +63,7 @@ class Layout:
     bands: Mapping[str, float]
     relays: bool
     acting: Sequence[str]
+    unit: str
     upright: bool
 
 
@@ -197,8 +199,8 @@ def _near_and_planes(layout: Layout, following: bool) -> rrb.Vertical:
     near = min(NEAR, layout.duration / 10)
     channels = [f"{name}/**" for name in layout.acting]
     thrust = [
-        _plot("thrust", "Thrust near the cursor [N or N m]", near=near, parts=channels),
-        *_spans([("thrust", "Thrust", "N or N m")], layout, channels),
+        _plot("thrust", f"Thrust near the cursor [{layout.unit}]", near=near, parts=channels),
+        *_spans([("thrust", "Thrust", layout.unit)], layout, channels),
     ]
     # Pulses are seen from near, a torque that follows its command from afar.
     thrust = thrust if layout.relays else [*thrust[1:], thrust[0]]

@@ -48,7 +48,7 @@ def write(path: Path, compared: Pair, factor: float | None = None) -> None:
         bodies=drawn_bodies(rest),
         frames=frames,
         factor=factor,
-        channels=channels(a.flight, rest, below.machine, (a.flight, b.flight)),
+        channels=channels(a.flight, below.machine, (a.flight, b.flight)),
         charts=below.charts,
         notes=tuple(
             x for x in (bent(above.model, above.machine, factor), "Translucent: run A.") if x

@@ -6,11 +6,11 @@ import numpy as np
 
 from spacecraft_sim import report_charts, report_columns, sketch, spans
 from spacecraft_sim.chart import Charts, vectors
-from spacecraft_sim.drawing import Drawing, channel_units, turned
+from spacecraft_sim.drawing import Drawing, turned
 from spacecraft_sim.families import families, is_quasi_rigid
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.report_columns import Columns, Figure, curve, plane, steps, track
-from spacecraft_sim.trajectory import Trajectory, moving_axes
+from spacecraft_sim.trajectory import Trajectory, channel_units, moving_axes
 
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
 
@@ -57,7 +57,7 @@ def page(
             for v in verdicts
             if v.t_worst is not None
         ]
-    if is_quasi_rigid(flights[0]) and (channels := channel_units(measured, drawing)):
+    if is_quasi_rigid(flights[0]) and (channels := channel_units(measured)):
         figures.insert(3, _lanes(columns, channels, measured))
     figures.append(_craft(columns, drawing))
     moving = moving_axes(measured, "quasi_rigid_rate")
@@ -91,13 +91,12 @@ def _history(
         for flight, (plant, width) in zip(flights, PLANTS, strict=True):
             if signal not in flight.signals or (kind == "tips" and k and plant == "reduced"):
                 continue
-            full, unit = plant == "MuJoCo", flight.units[signal].partition(" or ")[0]
+            full, unit = plant == "MuJoCo", flight.units[signal]
             tone = f"boom-{k % 5}" if kind == "tips" and full else f"{name}-{plant.lower()}"
             if kind == "tips":  # booms often swing alike: the later ones are thinner
                 tone, width = tone if full else "z-reduced", max(2.8 - 0.9 * k, 1) if full else 4.5
             trace = {"name": f"{name}, {plant}", "tone": tone, "width": width, "draw": "line"}
             traces.append({**trace, **curve(columns, flight.time, flight[signal])})
-    unit = "N m" if kind == "disturbance" else unit
     figure = {"id": kind, "kind": "history", "title": HISTORIES[kind], "unit": unit}
     return {**figure, "traces": traces, "bands": _bands(kind, bands)}
 
@@ -112,7 +111,7 @@ def _family(columns: Columns, title: str, names: Sequence[str], flights: Flights
         look = {"name": name.replace("_", " "), "tone": f"boom-{k % 5}", "width": 1.4}
         dashed = {"draw": "line", "dashed": k >= 5}
         traces.append({**look, **dashed, **curve(columns, flights[1].time, flights[1][name])})
-    unit = "N m" if title == "Torques" else flights[1].units[names[0]] if names else ""
+    unit = flights[1].units[names[0]] if names else ""
     figure = {"id": title.lower().replace(" ", "_"), "kind": "history", "title": title}
     return {**figure, "unit": unit, "traces": traces, "bands": []}
 

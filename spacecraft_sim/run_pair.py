@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,9 @@ import numpy as np
 
 from spacecraft_sim import mission
 from spacecraft_sim.compare import Difference, differences
-from spacecraft_sim.drawing import channel_units
-from spacecraft_sim.frames import at_rest
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.mission import Mission
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, channel_units
 from spacecraft_sim.versions import versions
 
 Array = np.ndarray
@@ -33,14 +31,12 @@ class Run:
         mission: What was flown.
         flight: The flight of the MuJoCo plant.
         verdicts: What became of its claims.
-        units: Of its thruster channels, by name.
     """
 
     folder: Path
     mission: Mission
     flight: Trajectory
     verdicts: tuple[Verdict, ...]
-    units: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,8 +99,7 @@ def read(folder: Path) -> Run:
     flown = mission.assemble(mission.load_scenario(scenario))
     flight = Trajectory.load(track)
     verdicts = tuple(guarantee.check(flight) for guarantee in flown.guarantees)
-    units = channel_units(flight, at_rest(flown.mujoco.model.ptr, flown.machine))
-    return Run(folder=folder, mission=flown, flight=flight, verdicts=verdicts, units=units)
+    return Run(folder=folder, mission=flown, flight=flight, verdicts=verdicts)
 
 
 def pair(a: Run, b: Run) -> Pair:
@@ -242,7 +237,7 @@ def _figures(run: Run) -> Figures:
     for boom in run.mission.machine.booms:  # other elastic parts have no one way to bend
         deflection = float(np.abs(flight[f"{boom.name}_tip_y"]).max())
         found[f"largest deflection of boom {boom.name}", "m"] = deflection
-    for channel, unit in run.units.items():
+    for channel, unit in channel_units(run.flight).items():
         changes = float(np.count_nonzero(np.diff(flight[f"{channel}_command"])))
         found[f"changes of command of {channel}", ""] = changes
         found[f"impulse spent by {channel}", f"{unit} s"] = float(flight[f"{channel}_spent"][-1])

@@ -1,7 +1,7 @@
 """The task of a flight: measure -> controller -> thrusters -> plant, on either plant."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,8 @@ class ControlTask(control.Task):
     Reward: 1/(1 + (angle/accuracy)^2), where the angle is that of `attitude_*`, rad; 1 on target,
     1/2 at the accuracy asked for.
 
+    Inputs of which `input_units` says nothing are torques, N m.
+
     Attributes:
         recorder: Collects rows while it is set.
     """
@@ -37,6 +39,7 @@ class ControlTask(control.Task):
         *,
         initial: Initial,
         disturbance: Disturbance,
+        input_units: Mapping[str, str] | None = None,
         accuracy: float = 1e-2,
         seed: int = 0,
     ):
@@ -51,6 +54,7 @@ class ControlTask(control.Task):
         self.recorder: Recorder | None = None
         self._controller, self._thrusters = controller, thrusters
         self._initial, self._disturbance = initial, disturbance
+        self._input_units = input_units or {}
         self._accuracy = accuracy
         self._random = np.random.default_rng(seed)
         self._channels = [thrusters.names.index(name) for name in controller.thrusters]
@@ -266,13 +270,14 @@ class ControlTask(control.Task):
         Args:
             physics: The plant.
         """
-        channels, inputs = self._thrusters.names, physics.inputs
+        inputs = {name: self._input_units.get(name, "N m") for name in physics.inputs}
+        channels = {name: inputs[name] for name in self._thrusters.names}
         return {
             **physics.units,
-            **dict.fromkeys(inputs, "N or N m"),
-            **{f"{name}_command": "N or N m" for name in channels},
-            **{f"{name}_impulse": "N s or N m s" for name in inputs},
-            **{f"{name}_spent": "N s or N m s" for name in channels},
+            **inputs,
+            **{f"{name}_command": unit for name, unit in channels.items()},
+            **{f"{name}_impulse": f"{unit} s" for name, unit in inputs.items()},
+            **{f"{name}_spent": f"{unit} s" for name, unit in channels.items()},
             **estimates_of(self._controller),
             **physics.coordinate_units(),
         }

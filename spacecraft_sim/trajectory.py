@@ -207,3 +207,13 @@ def moving_axes(trajectory: Trajectory, kind: str) -> list[str]:
     peaks = {axis: float(np.abs(x).max()) for axis, x in signals.items() if x is not None}
     least = 1e-3 * max(peaks.values(), default=0.0)
     return sorted((a for a in peaks if peaks[a] >= least), key=lambda axis: -peaks[axis])
+
+
+def channel_units(trajectory: Trajectory) -> dict[str, str]:
+    """Returns the thruster channels of a flight with their units.
+
+    Args:
+        trajectory: The flight.
+    """
+    names = [name for name in trajectory.signals if f"{name}_command" in trajectory.signals]
+    return {name: trajectory.units[name] for name in names}

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from spacecraft_sim import beam, linearize, mjcf
+from spacecraft_sim import beam, linearize, mission, mjcf
 from spacecraft_sim.readings import undeformed_mass_matrix
+from spacecraft_sim.trajectory import channel_units
 
 BOOM = {"length": 7.5, "linear_density": 1.53, "bending_stiffness": 35.0}
 HUB = {"bus_inertia": 30.0, "root_radius": 3.0}
@@ -184,6 +185,42 @@ def test_inputs_are_channels_then_disturbances_with_their_actuators(machine):
         "disturbance_z": ("disturbance_z",),
     }
     assert mjcf.motors(machine().thrusters[0]) == ("thruster_z",)
+
+
+MOTORS = """<mujoco><worldbody>
+  <body><freejoint/><geom size="1"/><site name="jet" euler="0 90 0"/>
+    <body><joint name="hinge"/><geom size="1"/>
+      <body><joint name="slide" type="slide"/><geom size="1"/></body></body></body>
+</worldbody><actuator>
+  <motor name="push" site="jet" gear="0 2 0 0 0 0"/>
+  <motor name="turn" site="jet" gear="0 0 0 0 1 0"/>
+  <motor name="at_hinge" joint="hinge"/><motor name="at_slide" joint="slide"/>
+</actuator></mujoco>"""
+
+
+def test_units_of_inputs_are_those_of_what_they_do():
+    model = mujoco.MjModel.from_xml_string(MOTORS)
+    one = {name: (name,) for name in ("push", "turn", "at_hinge", "at_slide")}
+    wanted = {"push": "N", "turn": "N m", "at_hinge": "N m", "at_slide": "N"}
+    assert mjcf.input_units(model, one) == wanted
+    assert mjcf.input_units(model, {"jets": ("turn", "push")}) == {"jets": "N"}
+
+
+@pytest.mark.parametrize(
+    ("name", "units"),
+    [("efremov-nonlocal", {"N m"}), ("ivanova-sokolov-two-axes", {"N", "N m"}),
+     ("burkov-position", {"N m"})],
+)  # fmt: skip
+def test_both_flights_of_a_scenario_know_the_units_of_their_thrusts(name, units):
+    ready = mission.assemble(mission.load_scenario(name, ("duration=1.0",)))
+    for plant in ("mujoco", "reduced"):
+        flight = ready.fly(plant)
+        channels = channel_units(flight)
+        assert set(flight.units[n] for n in ready.mujoco.inputs) == units
+        for channel, unit in channels.items():
+            assert flight.units[f"{channel}_command"] == unit
+            assert flight.units[f"{channel}_impulse"] == flight.units[f"{channel}_spent"]
+            assert flight.units[f"{channel}_spent"] == f"{unit} s"
 
 
 @pytest.mark.parametrize(("axis", "k"), [("x", 0), ("y", 1), ("z", 2)])

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from written import faults, texts
 
 from spacecraft_sim import cli, pair_folder, run_pair
-from spacecraft_sim.trajectory import Trajectory
+from spacecraft_sim.trajectory import Trajectory, channel_units
 
 NAME = "efremov-nonlocal"
 SETTINGS = {
@@ -159,7 +159,7 @@ def test_all_that_is_written_in_the_figure_can_be_read(a, b, runs, tmp_path, mon
     assert faults(figure) == []
     named = " ".join(words for words, _ in texts(figure))
     for key, name in (("A", a), ("B", b)):  # the channels of both, each with its unit
-        for channel in run_pair.read(runs / name).units:
+        for channel in channel_units(run_pair.read(runs / name).flight):
             assert f"{key}: {channel}" in named
     assert "N or N m" not in named or a == "axes"  # whose channels are forces
 
