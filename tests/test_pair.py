@@ -158,10 +158,14 @@ def test_all_that_is_written_in_the_figure_can_be_read(a, b, runs, tmp_path, mon
     (figure,) = kept
     assert faults(figure) == []
     named = " ".join(words for words, _ in texts(figure))
-    for key, name in (("A", a), ("B", b)):  # the channels of both, each with its unit
-        for channel in channel_units(run_pair.read(runs / name).flight):
+    units = set()
+    for key, name in (("A", a), ("B", b)):  # the channels of both
+        found = channel_units(run_pair.read(runs / name).flight)
+        units |= set(found.values())
+        for channel in found:
             assert f"{key}: {channel}" in named
-    assert "N or N m" not in named or a == "axes"  # whose channels are forces
+    assert f"from the start, {' or '.join(sorted(units))}" in named
+    assert (units == {"N", "N m"}) == (a in ("free", "axes"))  # which have forces
 
 
 @pytest.mark.parametrize("missing", ["scenario.toml", "trajectory.parquet"])
