@@ -5,16 +5,17 @@ attitude gamma, which swings on with the booms; it has a claim of its own, which
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from controllers.efremov_relay import ANGLE, RATE, MultilevelRelay, attracting, limit_cycle
+from controllers.observer import ESTIMATED
 from spacecraft_sim.guarantee import Assumption, Guarantee, Measurement
 from spacecraft_sim.reduced import ReducedModel
 from spacecraft_sim.thrusters import Thrusters
-from spacecraft_sim.trajectory import Trajectory, peak
+from spacecraft_sim.trajectory import Trajectory, peak, sample_rows
 
 PAPER = "Efremov et al. 2006"
 FINAL = 60.0  # the end of a flight over which final figures are taken, s
@@ -38,6 +39,7 @@ class Theorem:
         disturbance: |f| must stay below this, rad/s^2.
         entry: Hypotheses on (beta, v) at the start of feedback.
         assumed_delay: Delay that the law counts on and how far off it may be, s, if it does.
+        estimated: Largest error of each reading that the law takes from an observer, by name.
         time_source: Words on where the settling time comes from, if not from the theorem.
     """
 
@@ -51,6 +53,7 @@ class Theorem:
     disturbance: float
     entry: Callable[[float, float], tuple[Assumption, ...]]
     assumed_delay: tuple[float, float] | None = None
+    estimated: Mapping[str, float] = field(default_factory=dict)
     time_source: str = "; time from experiment"
 
 
@@ -195,7 +198,7 @@ class Claims:
         """Adds the hypotheses that only the flight can tell."""
 
         def measured(trajectory: Trajectory) -> Measurement:
-            m, start = measure(trajectory), self._feedback_start(trajectory)
+            m, start = measure(trajectory), self._start(trajectory)
             beta, v = self._state_at(trajectory, start)
             disturbance = Assumption(
                 text="|f/J| below the bound of the theorem",
@@ -228,13 +231,24 @@ class Claims:
                         unit="s",
                     ),
                 )
+            if self.theorem.estimated:
+                forgotten, end = self._forgotten(trajectory), float(trajectory.time[-1])
+                assumptions += (
+                    Assumption(
+                        text="since when the estimates keep their bounds",
+                        value=forgotten,
+                        limit=end - (self._settled(trajectory, forgotten) - forgotten),
+                        relation="<=",
+                        unit="s",
+                    ),
+                )
             assumptions += self.theorem.entry(beta, v)
             return Measurement(m.value, m.t_worst, m.predicted, m.bound, assumptions)
 
         return measured
 
     def _after_settling(self, trajectory: Trajectory) -> Measurement:
-        start = self._feedback_start(trajectory)
+        start = self._start(trajectory)
         start += self.theorem.settling(*self._state_at(trajectory, start))
         late = trajectory.time >= start
         if not late.any():
@@ -264,14 +278,16 @@ class Claims:
 
     def _final_start(self, trajectory: Trajectory) -> float:
         """Start of the last minute, not before |beta| < eps is promised, s."""
-        start = self._feedback_start(trajectory)
-        settled = start + self.theorem.settling(*self._state_at(trajectory, start)) + self._delay()
+        settled = self._settled(trajectory, self._start(trajectory))
         return max(float(trajectory.time[-1]) - FINAL, settled)
+
+    def _settled(self, trajectory: Trajectory, start: float) -> float:
+        """When |beta| < eps is promised if the theorem speaks from a start on, s."""
+        return start + self.theorem.settling(*self._state_at(trajectory, start)) + self._delay()
 
     def _goes_on(self, trajectory: Trajectory, span: float) -> Assumption:
         """That a flight goes on for some time after |beta| < eps is promised, to be judged."""
-        start = self._feedback_start(trajectory)
-        promised = start + self.theorem.settling(*self._state_at(trajectory, start)) + self._delay()
+        promised = self._settled(trajectory, self._start(trajectory))
         return Assumption(
             text="flight goes on after the predicted time",
             value=float(trajectory.time[-1]) - promised,
@@ -316,6 +332,25 @@ class Claims:
         stale = ~agrees & (time - since > longest)
         waited = time - np.maximum(np.where(np.isfinite(agreed), agreed, time[0]), since)
         return float(np.max(waited[stale], initial=0.0))
+
+    def _start(self, trajectory: Trajectory) -> float:
+        """When the theorem begins to speak, s: there is feedback, by estimates within bounds."""
+        start, forgotten = self._feedback_start(trajectory), self._forgotten(trajectory)
+        judged = self._settled(trajectory, forgotten) <= trajectory.time[-1]
+        return max(start, forgotten) if judged else start
+
+    def _forgotten(self, trajectory: Trajectory) -> float:
+        """Since when the estimates keep their bounds, s; the end of the flight if they do not."""
+        time = trajectory.time
+        if not self.theorem.estimated or self.law.period is None:
+            return float(time[0])
+        rows = sample_rows(time, self.law.period)[0]
+        over = [
+            np.abs(trajectory[f"{ESTIMATED}{name}"] - trajectory[name])[rows] > limit
+            for name, limit in self.theorem.estimated.items()
+        ]
+        last = int(np.flatnonzero(np.any(over, axis=0)).max(initial=-1))
+        return float(time[rows[last + 1]]) if last + 1 < len(rows) else float(time[-1])
 
     def _feedback_start(self, trajectory: Trajectory) -> float:
         """T2 of a flight, s; its first row if there is no attraction."""

@@ -12,7 +12,7 @@ from typing import Literal
 
 from controllers.efremov import design_nonlocal, settling_time
 from controllers.efremov_claims import PAPER, Claims, Theorem
-from controllers.efremov_relay import RATE, MultilevelRelay
+from controllers.efremov_relay import ANGLE, RATE, MultilevelRelay
 from controllers.observer import Errors, ObservedLaw, Unknown, design_observer
 from spacecraft_sim.checks import positive
 from spacecraft_sim.guarantee import Assumption, Guarantee
@@ -135,5 +135,6 @@ def _claims(
         disturbance=disturbance,
         entry=entry,
         assumed_delay=(thrusters[CHANNEL].delay.mean, delay_error),
+        estimated={ANGLE: angle, RATE: rate},
     )
     return Claims(theorem=theorem, law=relay, model=model, thrusters=thrusters).all()

@@ -6,7 +6,8 @@ x(k+1) = F x(k) + thrust,  x += L (y - C x), with the stationary Kalman gain L. 
 obeys the equations of the model with nothing but the jumps L (y - C x) on top; how large these and
 the errors become is bounded by sums over impulse responses, for torques that the observer is not
 told of, thrust that comes later than it believes, and sensor noise.  The modes are taken to be
-those of the machine: on others nothing is bounded, and nothing here says so.
+those of the machine: on others nothing is bounded, so claims that rest on these bounds read from
+the flight whether the estimates keep them.
 
 Stationary Kalman gain: B. D. O. Anderson, J. B. Moore, "Optimal filtering" (1979), chapter 4.
 """
@@ -341,7 +342,14 @@ def _kalman(F: Array, C: Array, disturbances: list[Array], noise: Array) -> Arra
     for b in disturbances:
         Q += np.outer(b, b) + _UNKNOWN**2 * np.diag(b**2) + 1e-12 * float(b @ b) * np.eye(n)
     R = np.diag(noise**2)
-    P = scipy.linalg.solve_discrete_are(F.T, C.T, Q / unit, R / unit)
+    try:
+        P = scipy.linalg.solve_discrete_are(F.T, C.T, Q / unit, R / unit)
+    except ValueError as error:  # LinAlgError is one
+        raise ValueError(
+            f"no gain can be computed for an observer of {n} states and sensor noise of "
+            f"{', '.join(f'{x:g}' for x in noise)}: let it have fewer modes (reduced.modes), or "
+            f"more noise: {error}"
+        ) from error
     L = P @ C.T @ np.linalg.inv(C @ P @ C.T + R / unit)
     if np.max(np.abs(np.linalg.eigvals((np.eye(n) - L @ C) @ F))) >= 1:
         raise ValueError("the sensors cannot see every mode: the observer does not converge")

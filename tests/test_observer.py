@@ -28,7 +28,7 @@ def estimation_errors(track, after):
 def test_estimate_is_exact_without_disturbance_noise_or_unknown_modes(sensors):
     settings = (
         f'controller.sensors="{sensors}"', "disturbance.z.amplitude=0.0",
-        "controller.angle_noise=1e-9", "controller.rate_noise=1e-9",
+        "controller.angle_noise=1e-9", "controller.rate_noise=1e-9", "reduced.modes=3",
     )  # fmt: skip
     _, track = flown(*settings)
     # The start of the booms is unknown; what it cost has died away.
@@ -124,6 +124,7 @@ def test_a_disturbance_too_large_for_the_observer_is_said_to_fail():
         ("controller.disturbance=-1.0", "disturbance = -1.0"),
         ("controller.angle_noise=0.0", "angle_noise = 0.0"),
         ('controller.sensors="rate"', "controller.sensors"),
+        ("controller.angle_noise=1e-8", "observer of 14 states .* fewer modes"),
     ],
 )
 def test_bad_input_is_refused(setting, message):
@@ -138,3 +139,28 @@ def test_a_delay_other_than_the_one_assumed_is_said_to_fail():
     verdict = ready.guarantees[0].check(ready.fly())
     assert not verdict.holds
     assert any("as the observer assumes" in a.text for a in verdict.failed)
+
+
+@pytest.mark.parametrize("modes", [3, 6])
+def test_modes_that_the_observer_does_not_know_are_said_to_break_its_bounds(modes):
+    ready, track = flown(f"reduced.modes={modes}", plant="mujoco")
+    for verdict in (g.check(track) for g in ready.guarantees[:3]):
+        failed = [a for a in verdict.failed if "estimates keep their bounds" in a.text]
+        assert verdict.holds == (modes == 6)
+        assert bool(failed) == (modes == 3)
+        assert verdict.margin > 0  # the figures alone would not tell
+
+
+def test_the_theorem_speaks_from_when_the_start_is_forgotten():
+    ready, track = flown()
+    verdict = ready.guarantees[0].check(track)
+    (since,) = [a.value for a in verdict.assumptions if "estimates keep" in a.text]
+    assert 5.0 < since < 20.0  # the booms swing at the start, which the observer does not know
+    rows = sample_rows(track.time, 0.01)[0]
+    late, over = track.time[rows] >= since, []
+    for name in ("quasi_rigid_angle_z", "quasi_rigid_rate_z"):
+        error = np.abs(track[f"estimated_{name}"] - track[name])[rows]
+        over.append(error[~late][-1] > error[late].max())
+    assert any(over)  # the last sample before is over a bound, and none after
+    swing = np.abs(track["quasi_rigid_angle_z"][track.time < since]).max()
+    assert verdict.measured < swing  # which the printed claim, from the start on, would have met
