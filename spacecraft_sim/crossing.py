@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 
 Point = tuple[float, float]  # time, least function
-WIDTH = 1e-11  # to which a switching instant is located, s
+WIDTH = 1e-11  # to which a switching instant is located, s, as long as the clock has the digits
 
 
 def foreseen(points: Sequence[Point]) -> float:
@@ -23,12 +23,13 @@ def foreseen(points: Sequence[Point]) -> float:
     if len(points) < 3:
         return math.inf
     t, before = points[-1][0], points[-2]
+    least = _width(t) / 2
     ahead = _root_of_parabola(points[-1], before, points[-3])
     if ahead < math.inf and len(points) > 3:
         ahead = _on_cubic(ahead, points)
     if ahead < 0.05 * (t - before[0]):
-        return t + ahead + WIDTH / 2
-    return t + (1 - 3e-5) * ahead
+        return t + ahead + least
+    return t + max((1 - 3e-5) * ahead, least)
 
 
 def _on_cubic(ahead: float, points: Sequence[Point]) -> float:
@@ -80,7 +81,7 @@ def first_not_positive(function: Callable[[float], float], points: Sequence[Poin
     """
     *earlier, a, b = points
     third = earlier[-1] if earlier else None
-    width, before = max(WIDTH, 4 * math.ulp(b[0])), math.inf
+    width, before = _width(b[0]), math.inf
     for _ in range(100):
         span = b[0] - a[0]
         if span <= width or -b[1] <= width * (a[1] - b[1]) / span:
@@ -95,6 +96,11 @@ def first_not_positive(function: Callable[[float], float], points: Sequence[Poin
         else:
             b, third = point, b
     return b
+
+
+def _width(t: float) -> float:
+    """The least time that can be told from none at `t`, s."""
+    return max(WIDTH, 4 * math.ulp(t))
 
 
 def _root_of_parabola(a: Point, b: Point, third: Point | None) -> float:

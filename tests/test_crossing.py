@@ -59,3 +59,13 @@ def test_a_dip_between_positive_ends_is_suspected_where_the_parabola_dips():
     points = [(t, (t - 0.4) ** 2 - 0.001) for t in (0.0, 0.3, 0.6)]
     assert suspected_dip(points) == pytest.approx(0.4)
     assert suspected_dip([(0.0, 1.0), (0.3, 0.9), (0.6, 0.85)]) is None  # nowhere near zero
+
+
+@pytest.mark.parametrize("start", [0.0, 1e3, 65536.3, 1e7])
+@pytest.mark.parametrize("span", [1e-11, 1e-9, 1e-3])
+def test_a_crossing_is_never_foreseen_at_the_instant_itself(start, span):
+    step = max(span, 8 * math.ulp(start))
+    times = [start + k * step for k in range(4)]
+    for values in ([3.0, 2.0, 1.0, 1e-12], [1.0, 0.5, 0.2, 1e-18], [4.0, 2.5, 1.2, 0.1]):
+        ahead = foreseen(list(zip(times, values, strict=True)))
+        assert ahead > times[-1]
