@@ -110,8 +110,10 @@ class Recording:
         if path:
             _make_sure_of_room(path.with_suffix(".room"))
         name = str(uuid4())
-        self._file = Outlet(APPLICATION, name, rr.FileSink(str(path.absolute()))) if path else None
-        self._viewer = Outlet(APPLICATION, name, rr.GrpcSink(viewer)) if viewer else None
+        # A viewer has one layout for all recordings of an application: each is one of its own.
+        own = f"{APPLICATION} {name[:8]}"
+        self._file = Outlet(own, name, rr.FileSink(str(path.absolute()))) if path else None
+        self._viewer = Outlet(own, name, rr.GrpcSink(viewer)) if viewer else None
         self._stream = stream = Stream([o for o in (self._file, self._viewer) if o])
         stream.send_recording_name(subject.title)
         self._document("scenario", record_text.scenario_page(subject.scenario))

@@ -49,6 +49,13 @@ def stores(path):
     return len(reader.recordings()), len(reader.blueprints())
 
 
+def application(path):
+    """Name of the application of a recording, which that of its layout must be."""
+    reader = _reader(path)
+    (name,) = {entry.application_id for entry in (*reader.recordings(), *reader.blueprints())}
+    return name
+
+
 def chunks(path):
     """How many chunks a file with a footer holds; a file without one is refused by rerun."""
     return len(_reader(path).store())

@@ -229,6 +229,14 @@ def test_parts_of_any_size_make_the_same_signals(short, tmp_path):
         assert entity.values == other.values, path
 
 
+def test_two_recordings_in_one_viewer_keep_their_layouts(short, tmp_path):
+    for name in ("one", "two"):
+        written(tmp_path / f"{name}.rrd", short, [1000])
+    one, two = (rrd.application(tmp_path / f"{name}.rrd") for name in ("one", "two"))
+    assert one != two
+    assert one.startswith("spacecraft_sim ")
+
+
 def test_the_flight_goes_out_while_it_is_flown(short, monkeypatch):
     ready, measured, _ = short
     monkeypatch.setattr(simulate, "CHUNK", 20)
