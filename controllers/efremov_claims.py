@@ -125,7 +125,14 @@ class Claims:
         def miss(trajectory: Trajectory) -> Measurement:
             end = self._feedback_start(trajectory) + self._delay()
             if end > trajectory.time[-1]:
-                return Measurement(math.nan)
+                over = Assumption(
+                    text="flight goes on until the pulses have acted",
+                    value=float(trajectory.time[-1]),
+                    limit=end,
+                    relation=">=",
+                    unit="s",
+                )
+                return Measurement(math.nan, assumptions=(over,))
             beta = float(np.interp(end, trajectory.time, trajectory[ANGLE]))
             return Measurement(beta, end, predicted=self._predicted_miss(trajectory))
 
@@ -175,8 +182,16 @@ class Claims:
                     limit=1e-6,
                     unit="s",
                 )
+                overcome = Assumption(
+                    text="|f/J| < p: the relay overcomes the disturbance",
+                    value=f,
+                    limit=p,
+                    unit="rad/s^2",
+                )
                 bound = (2 * f / p + _LEFT_OVER) * predicted + shift * f
-                return Measurement(m.value, m.t_worst, None, bound, (as_designed, settled))
+                return Measurement(
+                    m.value, m.t_worst, None, bound, (as_designed, overcome, settled)
+                )
 
             return measured
 

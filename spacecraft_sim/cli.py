@@ -1,6 +1,6 @@
 """The command `spacecraft-sim`: flights, and what is done beside them.
 
-Exit codes: 0 all claims hold, 1 a claim fails, 2 usage or bad input, 3 the run diverged or crashed,
+Exit codes: 0 all claims hold, 1 one does not, 2 usage or bad input, 3 the run diverged or crashed,
 or what it leaves cannot be written.
 A certificate holds if the attitude is guaranteed about each axis and every assumption holds.
 """
@@ -9,6 +9,7 @@ A certificate holds if the attitude is guaranteed about each axis and every assu
 
 import argparse
 import gc
+import math
 import os
 import sys
 import traceback
@@ -191,24 +192,7 @@ def _run(arguments: argparse.Namespace) -> int:
     address = viewer.spawn() if arguments.spawn else viewer.found(arguments.connect)
     folder = run_folder.create(arguments.out, mission.scenario.name)
     try:
-        from spacecraft_sim import beneath, record
-
-        subject = run_folder.subject(mission)
-        with record.Recording(subject, folder / "recording.rrd", address) as recording:
-            predicted = _fly(mission, "reduced")
-            recording.expect(beneath.reduced(subject, predicted, factor))
-            measured = _fly(mission, "mujoco", recording.take)
-            run_folder.write_flights(folder, mission.scenario, measured, predicted)
-            for flight in (measured, predicted):
-                if reason := flight.meta.get("diverged"):
-                    recording.stop(reason)
-                    print(f"spacecraft-sim: {reason}\nrecorded so far: {folder}", file=sys.stderr)
-                    return BROKEN
-            comparison = mission.judge(measured, predicted)
-            recording.conclude(comparison.verdicts)
-            # While the recording is written to its end.
-            run_folder.write_verdicts(folder, mission, comparison)
-            run_folder.write_pictures(folder, mission, measured, predicted, comparison)
+        done = run_folder.fly(folder, mission, viewer=address, exaggeration=factor, flown=_fly)
     except OSError as error:
         print(f"spacecraft-sim: {folder} cannot be written to its end: {error}", file=sys.stderr)
         return BROKEN
@@ -216,13 +200,18 @@ def _run(arguments: argparse.Namespace) -> int:
         traceback.print_exc()
         print(f"spacecraft-sim: the run crashed; what it wrote is in {folder}", file=sys.stderr)
         return BROKEN
+    for trouble in filter(None, (done.lost_viewer, done.lost_file)):
+        print(f"spacecraft-sim: {trouble}", file=sys.stderr)
+    if (comparison := done.comparison) is None:
+        reasons = [flight.meta.get("diverged") for flight in (done.measured, done.predicted)]
+        text = "\n".join(filter(None, reasons))
+        print(f"spacecraft-sim: {text}\nrecorded so far: {folder}", file=sys.stderr)
+        return BROKEN
     console = terminal.console()
     console.print(_verdict_table(comparison))
     console.print(_difference_line(comparison))
     console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
-    for trouble in filter(None, (recording.lost_viewer, recording.lost_file)):
-        print(f"spacecraft-sim: {trouble}", file=sys.stderr)
-    if recording.lost_file:
+    if done.lost_file:
         return BROKEN
     console.print(f"open the recording:  rerun {folder / 'recording.rrd'}", highlight=False)
     return HOLDS if all(verdict.holds for verdict in comparison.verdicts) else FAILS
@@ -259,7 +248,7 @@ def _verdict_table(comparison: "Comparison") -> Table:
         "", "claim", "predicted", "measured", "bound", "margin", "source", title="MuJoCo", box=None
     )
     for verdict in comparison.verdicts:
-        mark = "[green]holds[/]" if verdict.holds else "[red]FAILS[/]"
+        mark = f"[{'green' if verdict.holds else 'red'}]{verdict.outcome}[/]"
         sign = "+-" if verdict.kind == "within" else "  "
         table.add_row(
             mark,
@@ -267,7 +256,7 @@ def _verdict_table(comparison: "Comparison") -> Table:
             _figure(verdict.predicted, verdict.unit),
             _figure(verdict.measured, verdict.unit),
             sign + _figure(verdict.bound, verdict.unit),
-            f"{verdict.margin:.1%}",
+            "" if math.isnan(verdict.margin) else f"{verdict.margin:.1%}",
             verdict.source,
         )
         for assumption in verdict.failed:
@@ -289,7 +278,7 @@ def _difference_line(comparison: "Comparison") -> str:
 
 
 def _figure(value: float | None, unit: str) -> str:
-    return "" if value is None else f"{value:.6g} {unit}"
+    return "" if value is None or math.isnan(value) else f"{value:.6g} {unit}"
 
 
 if __name__ == "__main__":

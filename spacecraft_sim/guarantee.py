@@ -10,6 +10,7 @@ from spacecraft_sim.trajectory import Trajectory
 
 Relation = Literal["<", "<=", ">", ">="]
 _HOLDS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
+Outcome = Literal["holds", "FAILS", "not guaranteed", "not judged"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +73,15 @@ class Verdict:
     assumptions: tuple[Assumption, ...]
     failed: tuple[Assumption, ...]
     holds: bool
+
+    @property
+    def outcome(self) -> Outcome:
+        """What became of the claim, in a word; the bound counts only where it is guaranteed."""
+        if self.holds:
+            return "holds"
+        if math.isnan(self.measured):
+            return "not judged"
+        return "not guaranteed" if self.failed else "FAILS"
 
 
 @dataclass(frozen=True, slots=True)

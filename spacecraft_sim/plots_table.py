@@ -47,7 +47,9 @@ def table(axes: Axes, verdicts: Sequence[Verdict]) -> None:
 
 def _cell(v: Verdict, head: str) -> str:
     if head == "claim":
-        return f"not guaranteed: {v.claim}" if v.failed else v.claim
+        return v.claim if v.outcome in ("holds", "FAILS") else f"{v.outcome}: {v.claim}"
+    if head in ("measured", "margin") and v.outcome == "not judged":
+        return ""
     if head == "predicted":
         return "" if v.predicted is None else f"{v.predicted:.4g}"
     if head == "worst at":

@@ -221,7 +221,7 @@ def verdict_events(stream: Stream, verdicts: Sequence[Verdict], end: float, name
     """
     rows = []
     for v in verdicts:
-        word = "closest to its bound" if v.holds else "BROKEN" if v.margin < 0 else "not guaranteed"
+        word = {"holds": "closest to its bound", "FAILS": "BROKEN"}.get(v.outcome, v.outcome)
         about = f"{name}: claim {word}" if name else f"claim {word}"
         text = f"{about}: {v.claim}: {v.measured:.4g} {v.unit}, bound {v.bound:.4g}"
         level = "DEBUG" if v.holds else "ERROR"

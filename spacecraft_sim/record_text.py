@@ -3,6 +3,7 @@
 Words, not marks: the viewer panics on a glyph that its font lacks, as the cross.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 
 from spacecraft_sim.guarantee import Verdict
@@ -16,9 +17,11 @@ def verdict_page(title: str, verdicts: Sequence[Verdict], notes: Sequence[str]) 
         verdicts: The verdicts.
         notes: What is to be said of the recording itself.
     """
-    kept = sum(v.holds for v in verdicts)
-    fails = f", **{len(verdicts) - kept} FAIL**" if kept < len(verdicts) else ""
-    head = [f"# {kept} of {len(verdicts)} claims hold{fails}", f"{title}", ""]
+    outcomes = Counter(v.outcome for v in verdicts)
+    words = {"FAILS": "FAIL", "not guaranteed": "not guaranteed", "not judged": "not judged"}
+    others = [f", **{outcomes[x]} {word}**" for x, word in words.items() if outcomes[x]]
+    heading = f"# {outcomes['holds']} of {len(verdicts)} claims hold{''.join(others)}"
+    head = [heading, f"{title}", ""]
     return "\n".join([*head, *verdict_table(verdicts), *_failed(verdicts), "", *notes])
 
 
@@ -42,11 +45,13 @@ def verdict_table(verdicts: Sequence[Verdict]) -> list[str]:
     lines = ["|  | claim | predicted | measured | bound | margin | worst at | source |"]
     lines.append("|:-:|:--|--:|--:|--:|--:|--:|:--|")
     for v in verdicts:
-        claim = f"{'holds' if v.holds else '**FAILS**'} | {cell(v.claim)}"
+        claim = f"{'holds' if v.holds else f'**{v.outcome}**'} | {cell(v.claim)}"
         expected = "" if v.predicted is None else f"{v.predicted:.4g}"
         bound = f"{'±' if v.kind == 'within' else '≤ '}{v.bound:.3g} {v.unit}"
         worst = "" if v.t_worst is None else f"{v.t_worst:.2f} s"
-        figures = f"{expected} | {v.measured:.4g} | {bound} | {100 * v.margin:.3g} % | {worst}"
+        judged = v.outcome != "not judged"
+        found, margin = (f"{v.measured:.4g}", f"{100 * v.margin:.3g} %") if judged else ("", "")
+        figures = f"{expected} | {found} | {bound} | {margin} | {worst}"
         lines.append(f"| {claim} | {figures} | {cell(v.source)} |")
     return lines
 

@@ -53,14 +53,13 @@ def _verdict(number: int, v: Verdict, reduced: Verdict) -> Row:
     failed = "".join(
         f'<span class="note bad">assumption fails: {escape(str(a))}</span>' for a in v.failed
     )
-    word = "holds" if v.holds else "not guaranteed" if v.failed else "fails"
     share = min(max(v.margin, 0.0), 1.0) if v.margin == v.margin else 0.0
     bar = f'<span class="bar"><i style="width:{100 * share:.1f}%"></i></span>'
     worst = (
         "" if v.t_worst is None else f'<button data-time="{v.t_worst!r}">{v.t_worst:.2f} s</button>'
     )
     return (
-        word,
+        v.outcome,
         str(number),
         f"{escape(v.claim)}{source}{failed}",
         "" if v.predicted is None else amount(v.predicted, v.unit),

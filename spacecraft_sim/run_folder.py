@@ -2,8 +2,8 @@
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +41,70 @@ def create(path: Path | None, name: str) -> Path:
     except OSError as error:
         raise ValueError(f"--out {folder}: cannot be written: {error.strerror}") from error
     return folder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """What came of a run.
+
+    Attributes:
+        measured: Flight of the MuJoCo plant.
+        predicted: Flight of the reduced plant.
+        comparison: How the claims came out; None if a flight diverged.
+        lost_viewer: Why the viewer did not get all of the recording; None if it did.
+        lost_file: Why the file did not, likewise.
+    """
+
+    measured: Trajectory
+    predicted: Trajectory
+    comparison: Comparison | None
+    lost_viewer: str | None
+    lost_file: str | None
+
+
+def fly(
+    folder: Path,
+    mission: Mission,
+    *,
+    viewer: str | None = None,
+    exaggeration: float | None = None,
+    flown: Callable[..., Trajectory] = Mission.fly,
+) -> Run:
+    """Flies a mission on both plants and writes all that a run leaves.
+
+    Args:
+        folder: The folder, which exists.
+        mission: What is flown.
+        viewer: Address of an open viewer that is to show it; None for none.
+        exaggeration: How many times too far elastic parts are drawn bent; a round factor if None.
+        flown: Flies a plant, as `Mission.fly` does.
+
+    Raises:
+        OSError: If a file cannot be written; the recording alone may be lost, which is told.
+    """
+    from spacecraft_sim import beneath, record
+
+    about, comparison = subject(mission), None
+    with record.Recording(about, folder / "recording.rrd", viewer) as recording:
+        predicted = flown(mission, "reduced")
+        recording.expect(beneath.reduced(about, predicted, exaggeration))
+        measured = flown(mission, "mujoco", watch=recording.take)
+        write_flights(folder, mission.scenario, measured, predicted)
+        if reason := measured.meta.get("diverged") or predicted.meta.get("diverged"):
+            recording.stop(reason)
+        else:
+            comparison = mission.judge(measured, predicted)
+            recording.conclude(comparison.verdicts)
+            # While the recording is written to its end.
+            write_verdicts(folder, mission, comparison)
+            write_pictures(folder, mission, measured, predicted, comparison)
+    return Run(
+        measured=measured,
+        predicted=predicted,
+        comparison=comparison,
+        lost_viewer=recording.lost_viewer,
+        lost_file=recording.lost_file,
+    )
 
 
 def write_flights(folder: Path, scenario: Scenario, *flights: Trajectory) -> None:
@@ -185,6 +249,7 @@ def write_pictures(
 
 def _plain(verdict: Verdict) -> dict[str, Any]:
     plain = {name: _number(value) for name, value in asdict(verdict).items()}
+    plain["outcome"] = verdict.outcome
     plain["assumptions"] = [_assumption(a) for a in verdict.assumptions]
     plain["failed"] = [a.text for a in verdict.failed]
     return plain

@@ -127,3 +127,23 @@ def test_guarantee_without_a_bound_is_refused_by_its_claim():
         ValueError, match="the angle stays small: neither the design nor the flight"
     ):
         replace(BOUNDED, bound=None).check(FLIGHT)
+
+
+@pytest.mark.parametrize(
+    ("value", "assumptions", "outcome"),
+    [
+        (0.4, (TRUE,), "holds"),
+        (0.6, (TRUE,), "FAILS"),
+        (0.4, (FALSE,), "not guaranteed"),
+        (0.6, (FALSE,), "not guaranteed"),  # nothing was promised
+        (math.nan, (TRUE,), "not judged"),
+        (math.nan, (FALSE,), "not judged"),
+    ],
+)
+def test_the_outcome_tells_a_broken_bound_from_one_that_was_not_promised(
+    value, assumptions, outcome
+):
+    claim = replace(BOUNDED, measure=giving(value), assumptions=assumptions)
+    verdict = claim.check(FLIGHT)
+    assert verdict.outcome == outcome
+    assert verdict.holds == (outcome == "holds")

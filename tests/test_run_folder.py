@@ -1,0 +1,51 @@
+"""A run from Python leaves what the command leaves, with a law of the user's own."""
+
+from dataclasses import dataclass
+
+import rrd
+
+from spacecraft_sim import mission, run_folder
+from spacecraft_sim.trajectory import Trajectory
+
+LEFT = {"recording.rrd", "reduced.parquet", "report.html", "scenario.toml", "summary.png",
+        "trajectory.parquet", "verdict.json"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class DeadZone:
+    """A law that no registry knows."""
+
+    width: float
+    sensors, thrusters, period = ("attitude_z", "rate_z"), ("thruster_z",), 0.05
+
+    def init(self):
+        return None
+
+    def step(self, t, y, memory):
+        s = y[0] + 10 * y[1]
+        return (0.0 if abs(s) < self.width else -1.0 if s > 0 else 1.0,), memory
+
+    def events(self, t, y, memory):
+        return ()
+
+
+def test_a_law_of_ones_own_leaves_the_whole_folder(tmp_path):
+    laws = {"dead_zone": lambda model, thrusters, *, width: (DeadZone(width), ())}
+    settings = ("controller={law='dead_zone', width=0.01}", "duration=20.0")
+    ready = mission.assemble(mission.load_scenario("efremov-nonlocal", settings, laws), laws)
+    plants = []
+
+    def flown(mission, plant, watch=None):
+        plants.append(plant)
+        return mission.fly(plant, watch=watch)
+
+    folder = run_folder.create(tmp_path / "run", "dead-zone")
+    done = run_folder.fly(folder, ready, flown=flown)
+    assert plants == ["reduced", "mujoco"]
+    assert {path.name for path in folder.iterdir()} == LEFT
+    assert (done.lost_file, done.lost_viewer) == (None, None)
+    assert done.comparison
+    assert [verdict.outcome for verdict in done.comparison.verdicts] == ["holds"]  # momentum
+    saved = Trajectory.load(folder / "trajectory.parquet")
+    assert saved.time[-1] == done.measured.time[-1] == 20.0
+    assert rrd.read(folder / "recording.rrd")["/attitude/simulated"].time[-1] == 20.0
