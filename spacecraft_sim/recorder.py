@@ -4,6 +4,7 @@ The first recipe is the stream; when the input ends, be it that the run is over 
 killed, the recording is closed.  What prevents it is said on the output, with code 1.
 """
 
+import contextlib
 import os
 import signal
 import sys
@@ -44,7 +45,8 @@ def _close(stream: Any) -> int:
 
 
 def _give_up(reason: str) -> int:
-    os.write(sys.stdout.fileno(), reason.encode())
+    with contextlib.suppress(BrokenPipeError):  # the run was killed: nobody is there to hear it
+        os.write(sys.stdout.fileno(), reason.encode())
     os._exit(1)  # else rerun tries again at the end of the process, and may wait for ever
 
 

@@ -1,6 +1,7 @@
 """A viewer on this machine: addresses, a live flight, pictures of what it shows."""
 
 import contextlib
+import os
 import socket
 import subprocess
 import sys
@@ -14,7 +15,8 @@ import rrd
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-from spacecraft_sim import cli, viewer
+from spacecraft_sim import cli, record_stream, viewer
+from spacecraft_sim.record_stream import Outlet, Stream, rr
 
 NAME = "efremov-nonlocal"
 # A viewer is left running on purpose, which Python would remark on.
@@ -110,6 +112,24 @@ def test_connect_and_spawn_exclude_each_other(capsys):
 def test_a_viewer_that_does_not_start_is_a_clear_error():
     with pytest.raises(ValueError, match="the viewer ended with code"):
         viewer.spawn(("--no-such-option",))
+
+
+def test_a_viewer_that_answers_nothing_keeps_no_process_whose_run_was_killed(
+    listening, monkeypatch
+):
+    monkeypatch.setattr(record_stream, "FLUSH", 0.2)
+    outlet = Outlet("test", "one", rr.GrpcSink(f"rerun+http://127.0.0.1:{listening}/proxy"))
+    process = outlet.process
+    process.stdout.close()  # nobody is there to hear what it says
+    stream = Stream([outlet])
+    for _ in range(3):  # more than the way there takes
+        stream.log("page", rr.TextDocument(os.urandom(100_000).hex()), static=True)
+        stream.flush()
+    stream.end()
+    try:
+        assert process.wait(60) == 1
+    finally:
+        process.kill()
 
 
 # -- a viewer -------------------------------------------------------------------------------------
