@@ -11,18 +11,18 @@ import sys
 from threading import Timer
 from typing import Any
 
-import rerun as rr
-import rerun.blueprint as rrb
-
-from spacecraft_sim.recipe import made
-
 CLOSING = 20.0  # how long it may take to close, s; for a disk that was full it takes for ever
 
 
 def main() -> int:
     """Returns the exit code."""
-    for kind in (signal.SIGINT, signal.SIGTERM):  # they are for the run
+    for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # they are for the run
         signal.signal(kind, signal.SIG_IGN)
+    import rerun as rr  # only now: it takes a second, in which signals may come
+    import rerun.blueprint as rrb
+
+    from spacecraft_sim.recipe import made
+
     rr.set_strict_mode(True)  # a mistake is an error, not a remark
     told, names = sys.stdin.buffer, {"rr": rr, "rrb": rrb}
     stream = names["stream"] = made(told, names)

@@ -19,9 +19,11 @@ import pytest
 import rrd
 
 from spacecraft_sim import cli, mission
+from spacecraft_sim.record_stream import Outlet, Stream, rr
 from spacecraft_sim.repair import end, repair
 
 NAME = "efremov-nonlocal"
+FOR_THE_RUN = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 def started(out, size):
@@ -68,7 +70,7 @@ def test_the_file_of_a_killed_run_reads_up_to_its_last_rows(broken):
         rrd.chunks(broken)
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("how", [signal.SIGKILL, *FOR_THE_RUN])
 def test_a_run_that_is_killed_alone_leaves_a_whole_recording(how, tmp_path, capsys):
     run, path = started(tmp_path / "run", 1_000_000)
     (recorder,) = psutil.Process(run.pid).children()
@@ -83,6 +85,18 @@ def test_a_run_that_is_killed_alone_leaves_a_whole_recording(how, tmp_path, caps
     assert end(path) > 1.0
     assert cli.main(["repair", str(path)]) == 0
     assert "whole already" in capsys.readouterr().out
+
+
+def test_signals_while_its_process_starts_break_no_recording(tmp_path):
+    outlet = Outlet("test", "one", rr.FileSink(str(tmp_path / "recording.rrd")))
+    process, deadline = psutil.Process(outlet.process.pid), time.monotonic() + 60
+    while not any("numpy" in file.path for file in process.memory_maps()):  # rerun is next
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+    for kind in FOR_THE_RUN:
+        process.send_signal(kind)
+    Stream([outlet]).flush()
+    assert outlet.close() is None
 
 
 def test_repair_restores_the_footer_and_changes_nothing_else(broken, tmp_path, capsys):
