@@ -194,7 +194,9 @@ def _run(arguments: argparse.Namespace) -> int:
     try:
         done = run_folder.fly(folder, mission, viewer=address, exaggeration=factor, flown=_fly)
     except OSError as error:
-        print(f"spacecraft-sim: {folder} cannot be written to its end: {error}", file=sys.stderr)
+        notes = getattr(error, "__notes__", ())
+        text = f"spacecraft-sim: {folder} cannot be written to its end: {error}"
+        print("\n".join([text, *notes]), file=sys.stderr)
         return BROKEN
     except Exception:
         traceback.print_exc()

@@ -2,7 +2,8 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ from spacecraft_sim.versions import versions
 
 if TYPE_CHECKING:
     from spacecraft_sim.beneath import Subject
+    from spacecraft_sim.record import Recording
 
 
 def create(path: Path | None, name: str) -> Path:
@@ -81,11 +83,13 @@ def fly(
 
     Raises:
         OSError: If a file cannot be written; the recording alone may be lost, which is told.
+            Whatever is raised has a note of what of the recording was lost.
     """
     from spacecraft_sim import beneath, record
 
     about, comparison = subject(mission), None
-    with record.Recording(about, folder / "recording.rrd", viewer) as recording:
+    recording = record.Recording(about, folder / "recording.rrd", viewer)
+    with _losses_noted(recording), recording:
         predicted = flown(mission, "reduced")
         recording.expect(beneath.reduced(about, predicted, exaggeration))
         measured = flown(mission, "mujoco", watch=recording.take)
@@ -105,6 +109,16 @@ def fly(
         lost_viewer=recording.lost_viewer,
         lost_file=recording.lost_file,
     )
+
+
+@contextmanager
+def _losses_noted(recording: "Recording") -> Iterator[None]:
+    try:
+        yield
+    except BaseException as error:
+        for trouble in filter(None, (recording.lost_viewer, recording.lost_file)):
+            error.add_note(f"spacecraft-sim: {trouble}")
+        raise
 
 
 def write_flights(folder: Path, scenario: Scenario, *flights: Trajectory) -> None:
@@ -161,6 +175,7 @@ def subject(mission: Mission) -> "Subject":
         mission: What is flown.
     """
     from spacecraft_sim.beneath import Subject
+    from spacecraft_sim.record import Recording
 
     return Subject(
         title=mission.scenario.title,

@@ -77,6 +77,26 @@ def test_a_run_goes_on_without_its_recording_and_says_so(limited, tmp_path, caps
     assert (out / "verdict.json").exists()
 
 
+@pytest.mark.parametrize(
+    ("settings", "word"),
+    [(["initial.rate=[0.0, 0.0, 1e9]"], "diverged before"), ([], "the run crashed")],
+    ids=["diverges", "crashes"],
+)
+def test_a_recording_that_is_lost_is_told_whatever_becomes_of_the_run(
+    settings, word, started, tmp_path, capsys, monkeypatch
+):
+    def crash(*_):
+        raise RuntimeError("no judge left")
+
+    monkeypatch.setattr(mission.Mission, "judge", crash)
+    monkeypatch.setattr(run_folder, "write_flights", lambda *_: started[0].kill())
+    out = tmp_path / "out"
+    assert cli.main(["run", NAME, "--out", str(out), "--set", "duration=2.0", *settings]) == 3
+    message = capsys.readouterr().err
+    assert word in message
+    assert f"{out / 'recording.rrd'}: cannot be written to its end" in message
+
+
 def test_a_disk_that_is_full_from_the_start_is_told_before_the_flight(limited, tmp_path, capsys):
     limited(record.ROOM // 2)
     out = tmp_path / "out"
