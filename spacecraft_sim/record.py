@@ -102,17 +102,17 @@ class Recording:
         """
         self.lost_viewer: str | None = None
         self.lost_file: str | None = None
-        self._subject, self._path = subject, path
+        self._subject, self._path = subject, path and path.absolute()
         self._rest = at_rest(subject.model, subject.machine)
         self._bodies = drawn_bodies(self._rest)
         self._shown = 0  # rows of the flight beneath
         self._last: dict[str, dict[str, float]] = {}  # signals in the last row, by flight
-        if path:
-            _make_sure_of_room(path.with_suffix(".room"))
+        if self._path:
+            _make_sure_of_room(self._path.with_suffix(".room"))
         name = str(uuid4())
         # A viewer has one layout for all recordings of an application: each is one of its own.
         own = f"{APPLICATION} {name[:8]}"
-        self._file = Outlet(own, name, rr.FileSink(str(path.absolute()))) if path else None
+        self._file = Outlet(own, name, rr.FileSink(str(self._path))) if path else None
         self._viewer = Outlet(own, name, rr.GrpcSink(viewer)) if viewer else None
         self._stream = stream = Stream([o for o in (self._file, self._viewer) if o])
         stream.send_recording_name(subject.title)
@@ -357,6 +357,9 @@ def _make_sure_of_room(path: Path) -> None:
 
 def _unfinished(path: Path) -> str | None:
     """What a file lacks that was closed."""
-    with path.open("rb") as file:
-        file.seek(-len(_FOOTER) - 4, os.SEEK_END)
-        return None if file.read(len(_FOOTER)) == _FOOTER else "it has no footer"
+    try:
+        with path.open("rb") as file:
+            file.seek(-len(_FOOTER) - 4, os.SEEK_END)
+            return None if file.read(len(_FOOTER)) == _FOOTER else "it has no footer"
+    except OSError as error:  # it was taken away
+        return error.strerror

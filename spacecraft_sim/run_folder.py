@@ -175,7 +175,6 @@ def subject(mission: Mission) -> "Subject":
         mission: What is flown.
     """
     from spacecraft_sim.beneath import Subject
-    from spacecraft_sim.record import Recording
 
     return Subject(
         title=mission.scenario.title,

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -161,6 +162,31 @@ def test_a_process_that_dies_is_told_and_the_flight_goes_on(short, started, tmp_
         for _ in range(3):
             recording.take(trajectory.selected(measured, slice(50, None)))
     assert "the process that writes it ended with -9" in (recording.lost_file or "")
+
+
+@pytest.mark.parametrize("left", [None, b"", b"RRF2 and nothing else"])
+def test_a_file_that_is_taken_away_is_told(left, short, started, tmp_path):
+    subject, measured, below = short
+    path = tmp_path / "recording.rrd"
+    with record.Recording(subject, path) as recording:
+        recording.expect(below)
+        recording.take(measured)
+        recording.conclude(())
+        started[0].wait()
+        path.unlink()
+        if left is not None:
+            path.write_bytes(left)
+    assert f"{path}: cannot be written to its end" in (recording.lost_file or "")
+
+
+def test_a_relative_path_is_that_of_the_beginning(short, tmp_path, monkeypatch):
+    subject, _, below = short
+    monkeypatch.chdir(tmp_path)
+    with record.Recording(subject, Path("recording.rrd")) as recording:
+        recording.expect(below)
+        monkeypatch.chdir("/")
+    assert recording.lost_file is None
+    assert rrd.chunks(tmp_path / "recording.rrd")
 
 
 def test_a_file_that_does_not_close_is_given_up(monkeypatch, capfd):
