@@ -84,6 +84,7 @@ def _holds_something(path: Path) -> bool:
 
 
 def _rerun(*words: str) -> str | None:
-    """What `rerun rrd` says if it fails."""
+    """What `rerun rrd` says if it fails, or how it ended if it says nothing."""
     done = subprocess.run([*RERUN, "rrd", *words], capture_output=True, text=True)
-    return None if done.returncode == 0 else done.stderr.strip().splitlines()[-1]
+    said = done.stderr.strip() or f"rerun ended with {done.returncode}"
+    return None if done.returncode == 0 else said.splitlines()[-1]

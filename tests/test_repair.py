@@ -19,6 +19,7 @@ import pytest
 import rrd
 
 from spacecraft_sim import cli, mission
+from spacecraft_sim import repair as repairs
 from spacecraft_sim.record_stream import Outlet, Stream, rr
 from spacecraft_sim.repair import end, repair
 
@@ -167,6 +168,14 @@ def test_without_room_for_the_repaired_file_the_broken_one_is_left(broken, tmp_p
     path, free = shutil.copy(broken, tmp_path / "recording.rrd"), broken.stat().st_size - 1
     monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
     with pytest.raises(ValueError, match=r"takes 1\.\d MB; 1\.\d MB are free: make room"):
+        repair(path)
+    assert path.read_bytes() == broken.read_bytes()
+
+
+def test_a_repair_that_is_killed_is_told(broken, tmp_path, monkeypatch):
+    path = shutil.copy(broken, tmp_path / "recording.rrd")
+    monkeypatch.setattr(repairs, "RERUN", ("sh", "-c", "kill -KILL $$"))
+    with pytest.raises(ValueError, match=r"nothing of it can be read: rerun ended with -9"):
         repair(path)
     assert path.read_bytes() == broken.read_bytes()
 
