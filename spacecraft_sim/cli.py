@@ -13,7 +13,8 @@ import math
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Rows, figures and imports make many objects and hardly a cycle: to look for cycles after every
 # 700 of them takes a seventh of a run.
 gc.set_threshold(100_000, 20, 100)
+
+
+SOURCED = 120  # least width of a terminal in which the verdicts have their sources, characters
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -210,7 +214,9 @@ def _run(arguments: argparse.Namespace) -> int:
         print(f"spacecraft-sim: {text}\nrecorded so far: {folder}", file=sys.stderr)
         return BROKEN
     console = terminal.console()
-    console.print(_verdict_table(comparison))
+    console.print(_verdict_table(comparison, console.width))
+    for line in _failed_assumptions(comparison):
+        console.print(line, style="red", highlight=False)
     console.print(_difference_line(comparison))
     console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
     if done.lost_file:
@@ -245,25 +251,33 @@ def _fly(
         return mission.fly(plant, progress=show, watch=watch)
 
 
-def _verdict_table(comparison: "Comparison") -> Table:
-    table = Table(
-        "", "claim", "predicted", "measured", "bound", "margin", "source", title="MuJoCo", box=None
-    )
+def _verdict_table(comparison: "Comparison", width: int) -> Table:
+    """The verdicts; sources only where the terminal is wide enough for them, in characters."""
+    table = Table("", "claim", title="MuJoCo", box=None, pad_edge=False)
+    for head in ("predicted", "measured", "bound", "margin"):  # no digit is left out
+        table.add_column(head, no_wrap=True)
+    if sourced := width >= SOURCED:
+        table.add_column("source")
     for verdict in comparison.verdicts:
         mark = f"[{'green' if verdict.holds else 'red'}]{verdict.outcome}[/]"
         sign = "+-" if verdict.kind == "within" else "  "
         table.add_row(
             mark,
             verdict.claim,
-            _figure(verdict.predicted, verdict.unit),
-            _figure(verdict.measured, verdict.unit),
-            sign + _figure(verdict.bound, verdict.unit),
+            _figure(verdict.predicted),
+            _figure(verdict.measured),
+            f"{sign}{_figure(verdict.bound)} {verdict.unit}",
             "" if math.isnan(verdict.margin) else f"{verdict.margin:.1%}",
-            verdict.source,
+            *([verdict.source] if sourced else []),
         )
-        for assumption in verdict.failed:
-            table.add_row("", f"  [red]assumption fails: {assumption}[/]")
     return table
+
+
+def _failed_assumptions(comparison: "Comparison") -> Iterator[str]:
+    """Each assumption that does not hold, once, with how many claims rest on it."""
+    found = Counter(str(a) for verdict in comparison.verdicts for a in verdict.failed)
+    for text, count in found.items():
+        yield f"assumption fails: {text} ({count} claim{'s' * (count > 1)})"
 
 
 def _difference_line(comparison: "Comparison") -> str:
@@ -279,8 +293,8 @@ def _difference_line(comparison: "Comparison") -> str:
     return "MuJoCo minus reduced model, at most: " + ", ".join(parts)
 
 
-def _figure(value: float | None, unit: str) -> str:
-    return "" if value is None or math.isnan(value) else f"{value:.6g} {unit}"
+def _figure(value: float | None) -> str:
+    return "" if value is None or math.isnan(value) else f"{value:.6g}"
 
 
 if __name__ == "__main__":

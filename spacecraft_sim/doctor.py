@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from spacecraft_sim import video
+from spacecraft_sim.viewer import has_display
 
 State = Literal["ok", "missing", "limited"]
 
@@ -146,7 +147,7 @@ def _viewer() -> Check:
     if program is None:
         advice = "pip install rerun-sdk, to open recordings"
         return _lack("rerun viewer", "no program rerun", advice)
-    if platform.system() != "Linux" or any(map(os.environ.get, ("WAYLAND_DISPLAY", "DISPLAY"))):
+    if has_display():
         return _ok("rerun viewer", f"{_version(program)}; a display")
     advice = "open recordings on a machine with a display; report.html needs only a browser"
     return _lack("rerun viewer", f"{_version(program)}; no display", advice, "limited")

@@ -346,13 +346,19 @@ def plane_views(
             rrb.Spatial2DView(
                 origin=plane.origin,
                 contents=["+ $origin/**", *(f"+ /{path}/**" for path in shown)],
-                name=f"Phase plane, {plane.title}",
+                name=f"Phase plane{_which(plane, drawn)}, {plane.title}",
                 visual_bounds=rrb.VisualBounds2D(x_range=[-1.1, MARGIN[1]], y_range=[-1.2, 1.2]),
                 background=NIGHT,
                 overrides={f"{path}/track": [times] for path, times in shown.items()},
             )
         )
     return views
+
+
+def _which(plane: Plane, drawn: Sequence[Plane]) -> str:
+    """The axis of a plane, where there are planes of several."""
+    axes = {other.portrait.signals[0].rpartition("_")[2] for other in drawn}
+    return f" {plane.portrait.signals[0].rpartition('_')[2]}" if len(axes) > 1 else ""
 
 
 def map_views(charts: Charts) -> list[rrb.Spatial2DView]:

@@ -16,8 +16,8 @@ CLOSING = 20.0  # how long it may take to close, s; for a disk that was full it 
 
 def main() -> int:
     """Returns the exit code."""
-    for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # they are for the run
-        signal.signal(kind, signal.SIG_IGN)
+    for name in {"SIGINT", "SIGTERM", "SIGHUP"} & set(dir(signal)):  # they are for the run
+        signal.signal(getattr(signal, name), signal.SIG_IGN)
     import rerun as rr  # only now: it takes a second, in which signals may come
     import rerun.blueprint as rrb
 

@@ -2,6 +2,7 @@
 
 import ipaddress
 import os
+import platform
 import signal
 import socket
 import subprocess
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 
 # The viewer's program with its exit code, which `python -m rerun_cli` drops.
 RERUN = (sys.executable, "-P", "-c", "import sys, rerun_cli.__main__ as m; sys.exit(m.main())")
+HEADLESS = "--headless"  # option of a viewer without a window
 PORT = 9876  # where a viewer listens unless told otherwise
 _SCHEME, _PATH = "rerun+http://", "/proxy"
 
@@ -29,8 +31,9 @@ def found(text: str | None) -> str | None:
         return None
     host, port = _place(text)
     if not _listens(host, port):
+        given = f"--connect {text}".rstrip()
         raise ValueError(
-            f"--connect {text}: no viewer listens on {host}, port {port}; open one with "
+            f"{given}: no viewer listens on {host}, port {port}; open one with "
             f"'rerun --bind 127.0.0.1 --port {port}', or use --spawn"
         )
     return _address(host, port)
@@ -47,8 +50,13 @@ def spawn(options: Sequence[str] = (), patience: float = 30.0) -> str:
         Its full address.
 
     Raises:
-        ValueError: If it does not come to listen.
+        ValueError: If there is no display for it, or it does not come to listen.
     """
+    if HEADLESS not in options and not has_display():
+        raise ValueError(
+            "--spawn: no display for a viewer: neither DISPLAY nor WAYLAND_DISPLAY is set; leave "
+            "it out, and open the recording on a machine with a display"
+        )
     host, port = "127.0.0.1", PORT
     if _listens(host, port):
         port = _free_port(host)
@@ -69,6 +77,12 @@ def spawn(options: Sequence[str] = (), patience: float = 30.0) -> str:
             raise ValueError(f"--spawn: the viewer does not listen after {patience:g} s")
         time.sleep(0.05)
     return _address(host, port)
+
+
+def has_display() -> bool:
+    """Returns whether a window can be opened, as far as the environment tells."""
+    names = ("WAYLAND_DISPLAY", "DISPLAY")
+    return platform.system() != "Linux" or any(map(os.environ.get, names))
 
 
 def _place(text: str) -> tuple[str, int]:

@@ -23,7 +23,7 @@ NAME = "efremov-nonlocal"
 outlives = pytest.mark.filterwarnings(
     "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
 )
-HEADLESS = ("--headless", "--window-size", "1600x900", "--hide-welcome-screen")
+HEADLESS = (viewer.HEADLESS, "--window-size", "1600x900", "--hide-welcome-screen")
 
 
 @pytest.fixture
@@ -102,6 +102,15 @@ def test_a_run_is_refused_before_it_begins_if_no_viewer_listens(listening, tmp_p
     assert not (tmp_path / "out").exists()
 
 
+def test_without_a_display_no_viewer_is_spawned(tmp_path, monkeypatch, capsys):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setattr("platform.system", lambda: "Linux")
+    assert cli.main(["run", NAME, "--out", str(tmp_path / "out"), "--spawn"]) == 2
+    assert "no display for a viewer" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_connect_and_spawn_exclude_each_other(capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(["run", NAME, "--connect", "--spawn"])
@@ -111,7 +120,7 @@ def test_connect_and_spawn_exclude_each_other(capsys):
 @outlives
 def test_a_viewer_that_does_not_start_is_a_clear_error():
     with pytest.raises(ValueError, match="the viewer ended with code"):
-        viewer.spawn(("--no-such-option",))
+        viewer.spawn((viewer.HEADLESS, "--no-such-option"))
 
 
 def test_a_viewer_that_answers_nothing_keeps_no_process_whose_run_was_killed(
