@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from spacecraft_sim import linearize, mjcf, spacecraft
+from spacecraft_sim import library, linearize, mjcf, spacecraft
+from spacecraft_sim.elastic_mjcf import faults
 from spacecraft_sim.relay_channels import AXES, per_channel
 from spacecraft_sim.spacecraft import Spacecraft
 
@@ -57,8 +58,8 @@ def read(
             a file, or where torque and dwell are given and the thrusters do not count.
 
     Raises:
-        ValueError: If there is no such machine, a number is missing or out of range, or thrusters
-            are no pure torques about x, y and z.
+        ValueError: If there is no such machine, it is not a free bus with elastic parts, a number
+            is missing or out of range, or thrusters are no pure torques about x, y and z.
     """
     given = {
         "torque": _given("torque", torque),
@@ -72,6 +73,11 @@ def read(
     else:
         machine = _machine(name)
         model, title, name = mjcf.assemble(machine).compile(), machine.title, machine.name
+        if found := faults(model):
+            raise ValueError(
+                f"{name} is not a free bus with elastic parts: {'; '.join(found)}. "
+                f"Shipped machines that are: {_certifiable()}"
+            )
         whole = torque is not None and dwell is not None
         own = {"delay": np.zeros(3)} if whole else _of_thrusters(machine, model)
     numbers = {key: own.get(key) if value is None else value for key, value in given.items()}
@@ -118,6 +124,18 @@ def _machine(name: str) -> Spacecraft:
         raise ValueError(f"{error}; or give the path of an MJCF file, ending in .xml") from None
 
 
+def _certifiable() -> str:
+    """Shipped machines that can be certified as they stand, and those that need numbers."""
+    ready, asked = [], []
+    for name in library.spacecraft_names():
+        machine = spacecraft.load(name)
+        model = mjcf.assemble(machine).compile()
+        if not faults(model):
+            whole = all(v is not None for v in _of_thrusters(machine, model).values())
+            (ready if whole else asked).append(name)
+    return f"{', '.join(ready)}; with --torque and --dwell {', '.join(asked)}"
+
+
 def _of_thrusters(machine: Spacecraft, model: Any) -> dict[str, Array | None]:
     """Torque, dwell and delay of the thrusters, where there is one about each axis."""
     turns = {}
@@ -148,9 +166,11 @@ def _axis(machine: Spacecraft, model: Any, motors: tuple[str, ...], name: str) -
     force, torque = np.split(np.asarray(sum_), 2)
     k = int(np.argmax(np.abs(torque)))
     across = np.delete(torque, k)
-    if max(np.max(np.abs(force)), np.max(np.abs(across))) > _PURE * abs(torque[k]):
+    rest = max(np.max(np.abs(force)), np.max(np.abs(across)))
+    if torque[k] == 0 or rest > _PURE * abs(torque[k]):
         raise ValueError(
-            f"{machine.name}: {name} at unit level is a force {force} N and a torque {torque} N m; "
+            f"{machine.name}: {name} at unit level is a force {force} N and a torque {torque} N m "
+            "on the bus; "
             "a certificate needs pure torques about x, y and z: give --torque and --dwell"
         )
     return AXES[k], float(abs(torque[k]))

@@ -128,7 +128,8 @@ def _parser() -> argparse.ArgumentParser:
     certify.add_argument("--timestep", type=float, default=0.0, metavar="s", help=words)
     words = "search for the worst switchings in so many flights on MuJoCo about each axis"
     certify.add_argument("--attack", type=int, default=0, metavar="FLIGHTS", help=words)
-    certify.add_argument("--out", type=Path, help="folder to write; default runs/NAME, numbered")
+    words = "folder to write; default runs/certificate-NAME, numbered"
+    certify.add_argument("--out", type=Path, help=words)
     return parser
 
 

@@ -21,6 +21,7 @@ from spacecraft_sim.readings import undeformed_mass_matrix
 Array = np.ndarray
 
 _LEAST_LENGTH = 1e-3  # m: nothing that slides is nearer than that to the centre of mass
+_LISTED = 4  # joints that an error names
 _PROBE = 0.1  # rad or m, and per s: springs of joints are linear that far, others need not be
 
 
@@ -39,9 +40,8 @@ def elastic_model(model: mujoco.MjModel) -> ElasticModel:
             or several, a joint without stiffness or with negative damping, springs that are not
             linear or not at rest, gravity, contacts, constraints, servos, other passive forces.
     """
-    faults = _faults(model)
-    if faults:
-        raise ValueError(f"the model is not a free bus with elastic parts: {'; '.join(faults)}")
+    if found := faults(model):
+        raise ValueError(f"the model is not a free bus with elastic parts: {'; '.join(found)}")
     stiffness, damping = _stiffness(model), model.dof_damping[6:].copy()
     _refuse_other_forces(model, stiffness, damping)
     M = undeformed_mass_matrix(model)
@@ -61,6 +61,39 @@ def elastic_model(model: mujoco.MjModel) -> ElasticModel:
         travel=_travel(model),
         scale=_scale(model),
     )
+
+
+def faults(model: mujoco.MjModel) -> list[str]:
+    """Returns what keeps a model from being a free bus with linear elastic parts.
+
+    Args:
+        model: A compiled model.
+    """
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    if len(free) != 1:
+        several = f"{len(free)}, of {', '.join(_body_of(model, j) for j in free)}"
+        has = several if len(free) else _instead(model)
+        return [f"it needs one free joint, on the bus; it has {has}"]
+    bus = int(model.jnt_bodyid[free[0]])
+    found = []
+    loose = [j for j in range(model.njnt) if model.body_rootid[model.jnt_bodyid[j]] != bus]
+    if loose or free[0] != 0:
+        others = sorted({_body_of(model, j) for j in loose})
+        found.append(
+            f"the body with the free joint, {_body_of(model, free[0])}, must come first and carry "
+            f"all joints; beside it move {others}"
+        )
+    if model.njnt == 1:
+        found.append("no joint but the free one: nothing in it is elastic")
+    return found or _joint_faults(model) + _world_faults(model)
+
+
+def _instead(model: mujoco.MjModel) -> str:
+    """What joints there are where none is free."""
+    kinds = [mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower() for kind in model.jnt_type]
+    joints = [f"{kind} {_name(model, j)}" for j, kind in enumerate(kinds)]
+    more = ", ..." if len(joints) > _LISTED else ""
+    return f"none, but {', '.join(joints[:_LISTED])}{more}" if joints else "no joint at all"
 
 
 def with_elastic_masses(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
@@ -88,28 +121,6 @@ def elastic_bodies(model: mujoco.MjModel) -> Array:
     """
     bus = int(model.jnt_bodyid[0])
     return np.flatnonzero((model.body_weldid != bus) & (model.body_rootid == bus))
-
-
-def _faults(model: mujoco.MjModel) -> list[str]:
-    """What keeps the model from being a free bus with linear elastic parts."""
-    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
-    if len(free) != 1:
-        bodies = [_body_of(model, j) for j in free] or "none"
-        return [f"it needs one free joint, on the bus; it has {len(free)} ({bodies})"]
-    bus = int(model.jnt_bodyid[free[0]])
-    faults = []
-    loose = [j for j in range(model.njnt) if model.body_rootid[model.jnt_bodyid[j]] != bus]
-    if loose or free[0] != 0:
-        others = sorted({_body_of(model, j) for j in loose})
-        faults.append(
-            f"the body with the free joint, {_body_of(model, free[0])}, must come first and carry "
-            f"all joints; beside it move {others}"
-        )
-    if model.njnt == 1:
-        faults.append("no joint but the free one: nothing in it is elastic")
-    if faults:
-        return faults
-    return _joint_faults(model) + _world_faults(model)
 
 
 def _joint_faults(model: mujoco.MjModel) -> list[str]:

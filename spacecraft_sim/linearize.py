@@ -80,6 +80,27 @@ def linearize(model: mujoco.MjModel) -> Linearization:
     )
 
 
+def linearize_bus(model: mujoco.MjModel) -> Linearization:
+    """Reads the linear model off a machine whose bus has a joint of its own.
+
+    Args:
+        model: The compiled model.
+
+    Raises:
+        ValueError: As `linearize`; or if no body is called `bus`, or that body has no joint.
+    """
+    linear = linearize(model)
+    bodies = [model.body(i).name for i in range(1, model.nbody)]
+    if mjcf.BUS not in bodies:
+        named = [name for name in bodies if name]
+        raise ValueError(choices("body", mjcf.BUS, named, where="the MJCF of the machine"))
+    if not linear.rigid:
+        raise ValueError(
+            f"the body {mjcf.BUS!r} has no joint; give it a free joint or a hinge to turn on"
+        )
+    return linear
+
+
 def eigenvalues(model: mujoco.MjModel) -> Array:
     """Returns the eigenvalues of the free motion at the reference configuration, shape (2 nv,).
 

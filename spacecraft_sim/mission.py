@@ -316,7 +316,7 @@ def reduced_plant(scenario: Scenario, machine: Spacecraft, full: MujocoPhysics) 
             timestep=scenario.simulation.timestep,
         )
     model, modes = full.model.ptr, scenario.reduced.modes
-    linear = linearize.linearize(model)
+    linear = linearize.linearize_bus(model)
     wiring = mjcf.channels(machine, [n for n in full.inputs if n.startswith("disturbance_")])
     B = linear.B @ [[a in actuators for actuators in wiring.values()] for a in linear.actuators]
     if scenario.reduced.source == "galerkin":

@@ -265,9 +265,9 @@ def hinge(attributes):
 
 
 REFUSED = {
-    "no free joint": ({"base": '<joint name="yaw" axis="0 0 1"/>'}, "it has 0"),
-    "welded": ({"base": ""}, "it needs one free joint, on the bus; it has 0"),
-    "two free": ({"beside": LOOSE}, r"it has 2 \(\['body1', 'bus'\]\)"),
+    "no free joint": ({"base": '<joint name="yaw" axis="0 0 1"/>'}, "it has none, but hinge yaw"),
+    "welded": ({"base": ""}, "it needs one free joint, on the bus; it has none, but hinge"),
+    "two free": ({"beside": LOOSE}, "it has 2, of body1, bus"),
     "another root": ({"beside": HINGED}, r"beside it move \['body1'\]"),
     "rigid": ({"joint": 'type="hinge" stiffness="0"'}, r"joint body2.joint1 has stiffness 0\.0"),
     "no spring": (hinge('damping="1"'), r"joint hinge has stiffness 0\.0, needs > 0"),

@@ -1,5 +1,7 @@
 """The linear model read off the compiled one, against MuJoCo's own finite differences."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -164,6 +166,26 @@ def test_all_that_is_not_linear_is_named_at_once():
     model.dof_frictionloss[0] = 0.1
     with pytest.raises(ValueError, match="dry friction; gravity"):
         linearize.linearize(model)
+
+
+@pytest.mark.parametrize(
+    ("joint", "replaced", "message"),
+    [
+        (FREE, ('body name="bus"', 'body name="buss"'),
+         "body 'bus' is not in the MJCF of the machine; did you mean 'buss'? it has: arm, buss"),
+        (FREE, ('body name="bus"', "body"), "it has: arm, hand"),
+        ("", ("", ""), "the body 'bus' has no joint; give it a free joint or a hinge"),
+    ],
+)  # fmt: skip
+def test_a_machine_without_a_bus_that_moves_is_told_which_bodies_it_has(joint, replaced, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        linearize.linearize_bus(chain(joint, replaced))
+
+
+def test_the_linear_model_of_a_bus_is_that_of_the_machine():
+    found, plain = linearize.linearize_bus(chain(FREE)), linearize.linearize(chain(FREE))
+    np.testing.assert_array_equal(found.M, plain.M)
+    assert found.rigid == plain.rigid
 
 
 # -- initial states and the planar machine -----------------------------------------------------
