@@ -149,6 +149,15 @@ def dwells(flight: Trajectory, dwell: Array) -> tuple[Assumption, ...]:
     return tuple(found)
 
 
+def broken(verdict: Verdict) -> bool:
+    """Returns whether a flight passed a bound though every assumption held.
+
+    Args:
+        verdict: The verdict.
+    """
+    return not verdict.holds and not verdict.failed
+
+
 def word(verdict: Verdict) -> str:
     """Returns what a verdict comes to in a few words.
 

@@ -55,9 +55,10 @@ class AxisCertificate:
         quasi_rigid: What it guarantees of the attitude on the quasi-rigid angle.
         sway: Bound of |(J^-1 H q')_e|, how far the rate is from the quasi-rigid rate, rad/s.
         others: What other regulators guarantee in continuous time, alone, rad, by name.
+        refused_others: Why those that guarantee nothing do, by name.
         inertia_fraction: mu, the share of the inertia that moves elastically.
         decay: sigma of the mode that disturbs the axis most, 1/s.
-        remedy: What would help; None where the attitude is guaranteed.
+        remedy: What would help; None where e < 1 - |F|.
         assumptions: What all this rests on, with values.
     """
 
@@ -76,6 +77,7 @@ class AxisCertificate:
     quasi_rigid: Accuracy
     sway: float
     others: dict[str, float]
+    refused_others: dict[str, str]
     inertia_fraction: float
     decay: float
     remedy: Remedy | None
@@ -173,6 +175,7 @@ def certify(
         holds=lambda structure: disturbances(structure) < room,
         lighter=lighter,
     )
+    alone = {name: _alone(regulators or {}, axis) for name, axis in full.items()}
     return tuple(
         AxisCertificate(
             axis=name,
@@ -189,10 +192,8 @@ def certify(
             attitude=_accuracy(bands[name]),
             quasi_rigid=_accuracy(rigid[name]),
             sway=sway[k],
-            others={
-                law: axis.length * _or_inf(p0, abs(axis.bias), axis.disturbance)
-                for law, p0 in (regulators or {}).items()
-            },
+            others=alone[name][0],
+            refused_others=alone[name][1],
             inertia_fraction=float(elastic.inertia_fraction[k]),
             decay=_decay(elastic, found, k),
             remedy=helps.get(k),
@@ -268,11 +269,17 @@ def _accuracy(band: Band | None) -> Accuracy:
     return band.accuracy if band else NOTHING
 
 
-def _or_inf(p0: Regulator, F: float, e: float) -> float:
-    try:
-        return p0(F, e)
-    except ValueError:  # it guarantees nothing there
-        return math.inf
+def _alone(
+    regulators: Mapping[str, Regulator], axis: RelayAxis
+) -> tuple[dict[str, float], dict[str, str]]:
+    """What each regulator guarantees about an axis, rad, and why those that do not refuse."""
+    found, refused = {}, {}
+    for law, p0 in regulators.items():
+        try:
+            found[law] = axis.length * p0(abs(axis.bias), axis.disturbance)
+        except ValueError as error:  # it guarantees nothing there
+            found[law], refused[law] = math.inf, str(error)
+    return found, refused
 
 
 def _decay(elastic: ElasticModel, found: Influence, k: int) -> float:

@@ -1,21 +1,75 @@
-"""A certificate as rows of text, as JSON and as a picture."""
+"""A certificate as a page of text, as JSON and as a picture."""
 
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from spacecraft_sim.attack import word
+from spacecraft_sim import certificate_words
+from spacecraft_sim.attack import broken, word
 from spacecraft_sim.certificate import AxisCertificate
 from spacecraft_sim.certificate_curves import Curves
 from spacecraft_sim.certificate_input import Craft
+from spacecraft_sim.certificate_words import Fed, accuracy, angle, because, vacuous
 from spacecraft_sim.dwell_axes import Accuracy
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.versions import versions
 
-ARCSEC = math.degrees(1) * 3600  # of a radian
+BOUND = "  |theta| at most"  # label of the rows that count
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page:
+    """A certificate as it is printed and written.
+
+    Attributes:
+        title: What was certified.
+        holds: Whether it is certified, and no flight passed a bound.
+        result: What it comes to, in one sentence; it begins with "guaranteed" if it holds.
+        rows: A label and one text an axis.
+        sections: Lines under the table, by heading.
+    """
+
+    title: str
+    holds: bool
+    result: str
+    rows: tuple[tuple[str, ...], ...]
+    sections: dict[str, list[str]]
+
+
+def page(
+    craft: Craft,
+    certificates: Sequence[AxisCertificate],
+    measured: Sequence[Curves],
+    attacks: Mapping[str, Verdict],
+    flights: int,
+) -> Page:
+    """Puts a certificate into words.
+
+    Args:
+        craft: What was certified.
+        certificates: What is guaranteed about each axis.
+        measured: The curves of each axis.
+        attacks: The verdict on the worst flight about each axis that was attacked.
+        flights: How many were flown about each.
+    """
+    table, result = rows(certificates, measured), certificate_words.result(certificates, attacks)
+    reasons = explanations(certificates)
+    shown = "\n".join([result, *reasons, *(cell for row in table for cell in row)])
+    return Page(
+        title=f"{craft.name}: {craft.title}",
+        holds=all(c.holds for c in certificates) and not any(map(broken, attacks.values())),
+        result=result,
+        rows=tuple(table),
+        sections={
+            "symbols": certificate_words.glossary(shown),
+            "axis by axis": reasons,
+            "assumptions": assumptions(certificates),
+            "attacked": attacked(attacks, flights),
+        },
+    )
 
 
 def rows(
@@ -32,6 +86,19 @@ def rows(
     def row(label: str, text: Callable[[AxisCertificate], str]) -> None:
         table.append((label, *(text(c) for c in certificates)))
 
+    def bounds(law: str, fed: Fed) -> None:
+        """The terms of a bound and their sum."""
+
+        def cell(c: AxisCertificate, part: Callable[[Accuracy], float]) -> str:
+            own = accuracy(c, fed)
+            why = vacuous(certificates, c, fed)
+            if math.isinf(part(own)):
+                return f"vacuous: {why}"
+            return _angle(part(own)) if math.isfinite(own.contour) else ""
+
+        for label, part in ((law, _contour), *_TERMS[fed].items(), (BOUND, _total)):
+            row(label, lambda c, part=part: cell(c, part))
+
     row("torque M0", lambda c: f"{c.torque:.6g} N m")
     row("least time between switchings", lambda c: f"{c.dwell:.6g} s")
     row("constant disturbance F = M1/M0", lambda c: f"{c.bias:.4g}")
@@ -40,27 +107,38 @@ def rows(
     row("M_e, any switching (L1)", lambda c: f"{c.moment_l1:.7g} N m")
     table.append(("worst case that exists", *(_number(x.here, "N m", 6) for x in measured)))
     table.append(("  flown in MuJoCo", *(_flown(x) for x in measured)))
-    row("eps0 = M_e/M0", lambda c: f"{c.disturbance:.6g}")
+    row("e, disturbance over thrust", lambda c: f"{c.disturbance:.6g}")
     row("A_m of the worst joint", lambda c: f"{c.deflection:.4g} ({c.joint})")
-    row("two-level relay on the attitude: p0 u0 dwell^2", lambda c: _angle(c.attitude.contour))
-    for label, part in _TERMS.items():
-        row(f"  {label}", lambda c, part=part: _term(part(c.attitude), c.attitude.contour))
-    row("[bold]  |theta| at most[/]", lambda c: f"[bold]{_angle(c.attitude.total)}[/]")
+    bounds("relay on the attitude: p0 u0 dwell^2", "attitude")
     for name in certificates[0].others:
-        row(name, lambda c, name=name: _angle(c.others[name]))
-    row("relay on the quasi-rigid angle: p0 u0 dwell^2", lambda c: _angle(c.quasi_rigid.contour))
-    for label, part in _TERMS.items():
-        row(f"  {label}", lambda c, part=part: _angle(part(c.quasi_rigid)))
-    row("  sup |H q|/J", lambda c: _angle(c.quasi_rigid.lean))
-    row("[bold]  |theta| at most[/]", lambda c: f"[bold]{_angle(c.quasi_rigid.total)}[/]")
+        row(name, lambda c, name=name: _other(c, name))
+    bounds("relay on the quasi-rigid angle: p0 u0 dwell^2", "quasi_rigid")
     row("sup |H q'|/J", lambda c: f"{c.sway:.4g} rad/s")
     return table
 
 
-_TERMS: dict[str, Callable[[Accuracy], float]] = {
-    "late switching: sampling, delay": lambda a: a.sampling,
-    "axes turning each other": lambda a: a.coupling,
+def _contour(accuracy: Accuracy) -> float:
+    return accuracy.contour
+
+
+def _total(accuracy: Accuracy) -> float:
+    return accuracy.total
+
+
+_SHARED: dict[str, Callable[[Accuracy], float]] = {
+    "  late switching: sampling, delay": lambda a: a.sampling,
+    "  axes turning each other": lambda a: a.coupling,
 }
+_TERMS: dict[Fed, dict[str, Callable[[Accuracy], float]]] = {
+    "attitude": _SHARED,
+    "quasi_rigid": {**_SHARED, "  sup |H q|/J": lambda a: a.lean},
+}
+
+
+def _other(certificate: AxisCertificate, law: str) -> str:
+    """The bound of another regulator, or the condition that it misses."""
+    missed, _, _ = certificate.refused_others.get(law, "").partition(":")
+    return f"vacuous: {missed}" if missed else _angle(certificate.others[law])
 
 
 def _flown(curve: Curves) -> str:
@@ -89,28 +167,22 @@ def attacked(attacks: Mapping[str, Verdict], flights: int) -> list[str]:
 
 
 def explanations(certificates: Sequence[AxisCertificate]) -> list[str]:
-    """Returns a line on each axis, and on each that is vacuous what would help.
+    """Returns a line on each axis, why what is vacuous is, and what would help.
 
     Args:
         certificates: What is guaranteed about each axis.
     """
     lines = [f"printed bound refused: {certificates[0].refused}"] if certificates[0].refused else []
     for c in certificates:
-        lines.append(f"{c.axis}: {'vacuous on the attitude; ' if c.remedy else ''}{c.why}")
-        if c.remedy is None:
-            continue
-        helps = [
-            f"a dwell above {c.remedy.dwell:.4g} s"
-            if math.isfinite(c.remedy.dwell)
-            else "no dwell",
-            f"{c.remedy.damping:.3g} times the damping"
-            if math.isfinite(c.remedy.damping)
-            else "no damping",
-        ]
-        if not math.isnan(c.remedy.mass):
-            mass = f"elastic masses of {c.remedy.mass:.3g} times their own"
-            helps.append(mass if c.remedy.mass else "no elastic mass")
-        lines.append(f"   what would do, the rest unchanged: {', or '.join(helps)}")
+        mark = "vacuous on the attitude; " if vacuous(certificates, c, "attitude") else ""
+        lines.append(f"{c.axis}: {mark}{c.why}")
+        if mark and c.remedy is None:
+            lines.append(f"   {because(certificates, [c], 'attitude')}")
+        if c.remedy:
+            lines.append(f"   {certificate_words.remedy(c.axis, c.remedy)}")
+        if vacuous(certificates, c, "quasi_rigid"):
+            why = because(certificates, [c], "quasi_rigid")
+            lines.append(f"   vacuous on the quasi-rigid angle; {why}")
     return lines
 
 
@@ -126,15 +198,17 @@ def assumptions(certificates: Sequence[AxisCertificate]) -> list[str]:
 def write(
     folder: Path,
     craft: Craft,
+    page: Page,
     certificates: Sequence[AxisCertificate],
     measured: Sequence[Curves],
     attacks: Mapping[str, Verdict],
 ) -> None:
-    """Writes `certificate.json` and `certificate.png`.
+    """Writes `certificate.md`, `certificate.json` and `certificate.png`.
 
     Args:
         folder: An existing folder.
         craft: What was certified.
+        page: The certificate in words.
         certificates: What is guaranteed about each axis.
         measured: The curves of each axis.
         attacks: The verdict on the worst flight about each axis that was attacked.
@@ -143,7 +217,8 @@ def write(
 
     table = {
         "spacecraft": craft.name,
-        "holds": all(c.holds for c in certificates),
+        "holds": page.holds,
+        "result": page.result,
         "axes": [
             {
                 **asdict(c),
@@ -167,7 +242,25 @@ def write(
     }
     text = json.dumps(_plain(table), indent=2, allow_nan=False, ensure_ascii=False)
     (folder / "certificate.json").write_text(text + "\n", encoding="utf-8")
-    plots_certificate.write(folder / "certificate.png", craft.title, certificates, measured)
+    (folder / "certificate.md").write_text(_markdown(page), encoding="utf-8")
+    plots_certificate.write(
+        folder / "certificate.png", page.title, page.result, certificates, measured
+    )
+
+
+def _markdown(page: Page) -> str:
+    cells = [("", "x", "y", "z"), ("---",) * 4, *page.rows]
+    table = ["| " + " | ".join(c.strip().replace("|", "\\|") for c in row) + " |" for row in cells]
+    lines = [f"# {page.title}", "", f"**{page.result}**", "", *table]
+    for heading, texts in page.sections.items():
+        if texts:
+            lines += ["", f"## {heading}", "", *(_item(text) for text in texts)]
+    return "\n".join(lines) + "\n"
+
+
+def _item(text: str) -> str:
+    """A line of a list; one that is indented belongs to the line above."""
+    return f"  - {text.strip()}" if text.startswith(" ") else f"- {text}"
 
 
 def _number(value: float, unit: str, digits: int, word: str = "not computed") -> str:
@@ -176,16 +269,7 @@ def _number(value: float, unit: str, digits: int, word: str = "not computed") ->
 
 def _angle(value: float) -> str:
     """Radians and arc seconds."""
-    if math.isinf(value):
-        return "vacuous"
-    return f'{value:.4g} rad = {value * ARCSEC:.4g}"' if value else "0"
-
-
-def _term(value: float, first: float) -> str:
-    """A further term; nothing is said of it where the first is infinite."""
-    if math.isinf(first):
-        return ""
-    return _angle(value) if math.isfinite(value) else "unbounded"
+    return f"{value:.4g} rad = {angle(value)}" if value else "0"
 
 
 def _plain(value: Any) -> Any:

@@ -238,23 +238,24 @@ def certify(arguments: argparse.Namespace) -> int:
         attacks = attack_search.attack(craft.model, elastic, found, evaluations=arguments.attack)
     curves = certificate_curves.curves(craft.model, elastic, torque=craft.torque, dwell=craft.dwell)
     folder = run_folder.create(arguments.out, f"certificate-{craft.name}")
-    certificate_report.write(folder, craft, certificates, curves, attacks)
+    page = certificate_report.page(craft, certificates, curves, attacks, arguments.attack)
+    certificate_report.write(folder, craft, page, certificates, curves, attacks)
     console = terminal.console()
-    table = Table("", "x", "y", "z", title=f"{craft.name}: {craft.title}", box=None)
-    terminal.fill(table, certificate_report.rows(certificates, curves))
+    mark = "bold green" if page.holds else "bold red"
+    console.print(escape(page.result), style=mark, highlight=False)
+    table = Table("", "x", "y", "z", title=page.title, box=None)
+    for row in page.rows:
+        table.add_row(
+            *map(escape, row), style="bold" if row[0] == certificate_report.BOUND else None
+        )
     console.print(table)
-    for heading, lines in (
-        ("", certificate_report.explanations(certificates)),
-        ("assumptions", certificate_report.assumptions(certificates)),
-        ("attacked", certificate_report.attacked(attacks, arguments.attack)),
-    ):
-        if heading and lines:
+    for heading, lines in page.sections.items():
+        if lines:
             console.print(f"[bold]{heading}[/]")
         for line in lines:
-            console.print(f"  {line}" if heading else line, highlight=False)
+            console.print(escape(f"  {line}"), highlight=False)
     console.print(f"{folder}: " + ", ".join(sorted(p.name for p in folder.iterdir())))
-    broken = any(not v.holds and not v.failed for v in attacks.values())
-    return HOLDS if all(c.holds for c in certificates) and not broken else FAILS
+    return HOLDS if page.holds else FAILS
 
 
 # -- export ----------------------------------------------------------------------------------------

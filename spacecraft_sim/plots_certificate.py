@@ -1,6 +1,6 @@
 """The picture of a certificate: bounds, exact worst case and measured peaks over the dwell."""
 
-import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,30 +11,39 @@ from matplotlib.figure import Figure
 
 from spacecraft_sim.certificate import AxisCertificate
 from spacecraft_sim.certificate_curves import Curves
+from spacecraft_sim.certificate_words import promise
 from spacecraft_sim.plots import BAD, DPI, GOOD, INK, SOFT, panel
 
+_WIDTH = 225  # letters of the result a line
 PRINTED, ANY, EXACT = GOOD, "#c98a00", "#1f6fd6"
 
 
 def write(
-    path: Path, title: str, certificates: Sequence[AxisCertificate], measured: Sequence[Curves]
+    path: Path,
+    title: str,
+    result: str,
+    certificates: Sequence[AxisCertificate],
+    measured: Sequence[Curves],
 ) -> None:
     """Draws a panel an axis, moments over dwells, both logarithmic.
 
     Args:
         path: The PNG file.
         title: One line over the page.
+        result: The sentence below it.
         certificates: What is guaranteed about each axis.
         measured: The curves of each axis.
     """
     figure = Figure(figsize=(18.0, 7.0), dpi=DPI)
     FigureCanvasAgg(figure)
-    figure.text(0.012, 0.955, title, size=15, weight="bold", color=INK, va="center")
-    grid = figure.add_gridspec(1, 3, left=0.05, right=0.985, top=0.86, bottom=0.17, wspace=0.2)
+    figure.text(0.012, 0.965, title, size=15, weight="bold", color=INK, va="center")
+    said = "\n".join(textwrap.wrap(result, _WIDTH))
+    figure.text(0.012, 0.937, said, size=10.5, color=INK, va="top")
+    grid = figure.add_gridspec(1, 3, left=0.05, right=0.985, top=0.79, bottom=0.17, wspace=0.2)
     key = {}
     for k, (certificate, curve) in enumerate(zip(certificates, measured, strict=True)):
         axes = figure.add_subplot(grid[0, k])
-        words = _promise(certificate)
+        words = promise(certificates, certificate)
         panel(axes, words, "least time between switchings, s", "moment of elastic parts, N m")
         if len(curve.worst):
             _axis(axes, certificate, curve)
@@ -47,17 +56,6 @@ def write(
         key.values(), key.keys(), loc="lower center", ncols=len(key), fontsize=9.5, frameon=False
     )
     figure.savefig(path, pil_kwargs={"compress_level": 3})
-
-
-def _promise(certificate: AxisCertificate) -> str:
-    """What is guaranteed about an axis, for the head of its panel."""
-    head = f"{certificate.axis}: e = {certificate.disturbance:.3g}"
-    bounds = {"attitude": certificate.attitude, "quasi-rigid angle": certificate.quasi_rigid}
-    for fed, accuracy in bounds.items():
-        if math.isfinite(accuracy.total):
-            arcsec = math.degrees(accuracy.total) * 3600
-            return f'{head}, |theta| <= {arcsec:.3g}" by the {fed}'
-    return f"{head}, nothing is guaranteed"
 
 
 def _axis(axes: Axes, certificate: AxisCertificate, curve: Curves) -> None:

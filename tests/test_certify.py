@@ -1,6 +1,7 @@
 """The command `certify`: tables, files, exit codes."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -36,10 +37,14 @@ def test_a_machine_that_is_certified_ends_with_0(light):
     lines = {line.strip().split("  ")[0]: line for line in shown.splitlines()}
     assert "0.1 N m" in lines["torque M0"]
     assert "0.03876604 N m" in lines["M_e, printed bound"]
-    assert lines["eps0 = M_e/M0"].split()[-3:] == ["0.256585", "0", "0.269969"]
+    assert lines["e, disturbance over thrust"].split()[-3:] == ["0.256585", "0", "0.269969"]
     assert "(left_x)" in lines["A_m of the worst joint"]
-    assert '0.0004356 rad = 89.85"' in lines["two-level relay on the attitude: p0 u0 dwell^2"]
-    assert "vacuous" in lines["thrust against M1 alone, Ivanova & Sokolov"]
+    assert '0.0004356 rad = 89.85"' in lines["relay on the attitude: p0 u0 dwell^2"]
+    alone = lines["thrust against M1 alone, Ivanova & Sokolov"]
+    assert "vacuous: eps = 0.256585 must be < F = 0" in alone
+    assert shown.startswith(
+        'guaranteed about x 93.25", y 36.71", z 102.4" (relay on the attitude); every assumption'
+    )
     assert shown.count("|theta| at most") == 2
     assert "small motion: deflection of" in shown
     assert "slow rotation: rate over the slowest decay: 0.01" in shown
@@ -51,6 +56,7 @@ def test_the_json_says_all_of_it(light):
     found = json.loads((light[1] / "certificate.json").read_text(encoding="utf-8"))
     assert found["spacecraft"] == "two_boom_light"
     assert found["holds"] is True
+    assert light[2].startswith(found["result"])
     assert [axis["axis"] for axis in found["axes"]] == ["x", "y", "z"]
     x, y, _ = found["axes"]
     parts = ("contour", "sampling", "coupling", "lean")
@@ -91,12 +97,25 @@ def test_a_certificate_can_be_attacked(tmp_path, capsys):
     assert not (tmp_path / "b").exists()
 
 
+def test_the_page_is_written_as_it_is_printed(light):
+    _, out, shown = light
+    page = (out / "certificate.md").read_text(encoding="utf-8")
+    assert f"**{shown.splitlines()[0]}**" in page
+    table = [line for line in page.splitlines() if line.startswith("| ")]
+    assert all(len(re.findall(r"(?<!\\)\|", line)) == 5 for line in table)
+    assert sum("theta" in line for line in table) == 2
+    for heading in ("symbols", "axis by axis", "assumptions"):
+        assert f"## {heading}" in page
+    assert "## attacked" not in page  # it was not
+
+
 @slow
 def test_a_machine_that_is_not_ends_with_1_and_says_what_would_help(tmp_path, capsys):
     assert certify(tmp_path / "out", "two_boom_3d") == 1
     shown = capsys.readouterr().out
     assert "x: vacuous on the attitude; e = 20.74 >= 1 - |F| = 1" in shown
-    assert "a dwell above 100.8 s, or 44.7 times the damping, or elastic masses of 0.18" in shown
+    assert "a dwell above 100.8 s, or 44.7 times the damping, or elastic masses times 0.18" in shown
+    assert shown.startswith("not certified: about x and z nothing is guaranteed because the dist")
     assert "x: sampling period and delay within the dwell: 0.12 <= 2.66 s" in shown
     found = json.loads((tmp_path / "out" / "certificate.json").read_text(encoding="utf-8"))
     assert found["holds"] is False
