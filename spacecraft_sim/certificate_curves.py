@@ -93,10 +93,14 @@ def curves(
         if spent > _STEPS:
             left_out[k].append(f"flight at {dwell[k] * f:.4g} s: over {_STEPS} steps in all")
             continue
-        flight = fly(
-            model, switch_times=case.switch_times, levels=case.levels, duration=case.duration,
-            timestep=step,
-        )  # fmt: skip
+        try:
+            flight = fly(
+                model, switch_times=case.switch_times, levels=case.levels, duration=case.duration,
+                timestep=step,
+            )  # fmt: skip
+        except ValueError as error:  # so far beyond small motion that it diverges
+            left_out[k].append(f"flight at {dwell[k] * f:.4g} s: {error}")
+            continue
         small = all(a.holds for a in small_motion(elastic, flight))
         peaks[k, f] = (float(np.abs(flight[f"moment_{AXES[k]}"]).max()), float(small))
     return tuple(

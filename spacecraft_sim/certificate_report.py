@@ -68,6 +68,7 @@ def page(
             "axis by axis": reasons,
             "assumptions": assumptions(certificates),
             "attacked": attacked(attacks, flights),
+            "left out": [f"{curve.axis}: {what}" for curve in measured for what in curve.left_out],
         },
     )
 

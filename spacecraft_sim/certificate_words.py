@@ -120,8 +120,8 @@ def because(
         f"{c.axis} {c.torque / c.inertia * c.dwell**2:.3g} rad" for c in certificates
     )
     return (
-        f"the axes turn each other too fast (u0 dwell^2 is {lengths}): shorten the dwell or weaken "
-        "the thrust"
+        f"the axes turn each other too fast (u0 dwell^2 is {lengths}): weaken the thrust, shorten "
+        "the dwell or switch less late"
     )
 
 

@@ -244,3 +244,13 @@ def test_code_1_is_explained_by_the_first_line(tmp_path, capsys):
     first, *_ = capsys.readouterr().out.splitlines()
     assert first.startswith("not certified: an assumption does not hold (small motion: deflection")
     assert "; slow rotation: rate over the slowest decay: not 0.1" in first
+
+
+def test_what_is_left_out_of_the_curves_is_said(tmp_path, capsys):
+    # So strong a thrust bends the booms by radians, and the flight of the worst schedule diverges.
+    words = ("--torque", "20", "--dwell", "40", "--out", str(tmp_path / "out"))
+    assert cli.main(["certify", "two_boom_light", *words]) == 1
+    shown = capsys.readouterr().out
+    assert shown.startswith("not certified: ")
+    assert "left out" in shown
+    assert re.search(r"[xz]: flight at \d+ s: the motion is not finite", shown)
