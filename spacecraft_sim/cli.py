@@ -2,7 +2,8 @@
 
 Exit codes: 0 all claims hold, 1 one does not, 2 usage or bad input, 3 the run diverged or crashed,
 or what it leaves cannot be written.
-A certificate holds if the attitude is guaranteed about each axis and every assumption holds.
+A certificate holds if the attitude is guaranteed about each axis, every assumption holds and no
+flight passed a bound; its first line says so, or why not.
 """
 
 # Heavy modules are imported by the commands that need them.
