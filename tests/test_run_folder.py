@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+import pytest
 import rrd
+from rich.console import Console
 
-from spacecraft_sim import mission, run_folder
+from spacecraft_sim import cli, mission, run_folder
 from spacecraft_sim.trajectory import Trajectory
 
 LEFT = {"recording.rrd", "reduced.parquet", "report.html", "scenario.toml", "summary.png",
@@ -49,3 +51,21 @@ def test_a_law_of_ones_own_leaves_the_whole_folder(tmp_path):
     saved = Trajectory.load(folder / "trajectory.parquet")
     assert saved.time[-1] == done.measured.time[-1] == 20.0
     assert rrd.read(folder / "recording.rrd")["/attitude/simulated"].time[-1] == 20.0
+
+
+@pytest.mark.parametrize("width", [80, 119, 120, 200])
+def test_a_narrow_terminal_loses_no_digit(width):
+    ready = mission.assemble(mission.load_scenario("efremov-nonlocal", ("duration=20.0",)))
+    comparison = ready.judge(ready.fly(), ready.fly("reduced"))
+    console = Console(width=width)
+    with console.capture() as shown:
+        console.print(cli._verdict_table(comparison, width))
+    lines = shown.get().splitlines()
+    assert max(map(len, lines)) <= width
+    for verdict in comparison.verdicts:
+        assert any(f"{verdict.bound:.6g} {verdict.unit}" in line for line in lines)
+    assert ("source" in lines[1]) == (width >= 120)
+    failed = list(cli._failed_assumptions(comparison))
+    texts = {str(a) for verdict in comparison.verdicts for a in verdict.failed}
+    assert sorted(line.split(": ", 1)[1].rpartition(" (")[0] for line in failed) == sorted(texts)
+    assert any("until the pulses have acted" in line and "(1 claim)" in line for line in failed)
