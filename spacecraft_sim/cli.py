@@ -95,7 +95,12 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--out", type=Path, help="folder to write; default runs/A-and-B, numbered")
     compare.add_argument("--exaggeration", type=float, metavar="FACTOR", help=factor)
     repair = command(cli_tools.repair, "make a recording whole whose run was killed")
-    repair.add_argument("file", type=Path, metavar="FILE.rrd", help="recording; it is replaced")
+    repair.add_argument(
+        "file",
+        type=Path,
+        metavar="FILE.rrd",
+        help="recording, or the folder of its run; it is replaced",
+    )
     margins = command(
         cli_tools.margins, "say what delay, sampling period and torque limits a smooth law bears"
     )

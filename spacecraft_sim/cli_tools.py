@@ -66,8 +66,9 @@ def repair(arguments: argparse.Namespace) -> int:
     """
     from spacecraft_sim import repair
 
-    words = "repaired" if repair.repair(arguments.file) else "whole already"
-    print(f"{arguments.file}: {words}; it reads up to t = {repair.end(arguments.file):.6g} s")
+    file = arguments.file / "recording.rrd" if arguments.file.is_dir() else arguments.file
+    words = "repaired" if repair.repair(file) else "whole already"
+    print(f"{file}: {words}; it reads up to t = {repair.end(file):.6g} s")
     return HOLDS
 
 
