@@ -17,6 +17,7 @@ from spacecraft_sim.signal_groups import Group
 NEAR = 8.0  # half-width of the plots that follow the cursor, s, or a tenth of the flight
 LONG, ROUND = 1.85, 2.9  # distance of the eye in radii of the ball, for booms and for all else
 MINUTE = 60.0  # which a playback lasts at least, if it is faster than real time, s
+FEW = 2  # curves of a flight whose names leave room for the curves
 DOCUMENTS = ("verdicts", "scenario")
 
 
@@ -131,6 +132,7 @@ def _plot(
     half: float | None = None,
     bounds: Sequence[str] = (),
     parts: Sequence[str] = ("**",),
+    key: bool = True,
 ) -> rrb.TimeSeriesView:
     """A plot of the whole flight, or near the cursor."""
     return rrb.TimeSeriesView(
@@ -139,7 +141,7 @@ def _plot(
         name=name,
         axis_x=_time(near, until),
         axis_y=rrb.ScalarAxis(range=(-half, half)) if half else None,
-        plot_legend=rrb.PlotLegend(corner="RightTop"),
+        plot_legend=rrb.PlotLegend(corner="RightTop", visible=key),
     )
 
 
@@ -149,8 +151,11 @@ def _histories(layout: Layout) -> rrb.Vertical:
     rows: list[rrb.Container | rrb.View] = []
     for role in ("position", "rate", "tip"):
         groups = [group for group in layout.groups if group.role == role]
+        # The colours are those of the first plot: where they are many, its key is enough.
+        key = role == "position" or all(len(group.labels) <= FEW for group in groups)
+        titles = [(g.name, f"{g.title}, to {g.size:.2g}", g.unit) for g in groups]
         if groups:
-            rows.append(rrb.Tabs(*_spans([(g.name, g.title, g.unit) for g in groups], layout)))
+            rows.append(rrb.Tabs(*_spans(titles, layout, key=key)))
         kept = [g for g in groups if any(signal in paths for signal in g.signals)]
         if kept:
             rows.append(rrb.Tabs(*(_kept(group, layout.bands, paths) for group in kept)))
@@ -161,16 +166,19 @@ def _histories(layout: Layout) -> rrb.Vertical:
 
 
 def _spans(
-    plots: Sequence[tuple[str, str, str]], layout: Layout, parts: Sequence[str] = ("**",)
+    plots: Sequence[tuple[str, str, str]],
+    layout: Layout,
+    parts: Sequence[str] = ("**",),
+    key: bool = True,
 ) -> list[rrb.TimeSeriesView]:
     """Plots of the whole flight; before them, of one that comes to rest, plots of its beginning."""
     titles = [(origin, f"{title} [{unit or '-'}]") for origin, title, unit in plots]
-    whole = [_plot(origin, title, parts=parts) for origin, title in titles]
+    whole = [_plot(origin, title, parts=parts, key=key) for origin, title in titles]
     if not layout.active:
         return whole
     words = f"first {layout.active:.3g} s"
     first = [
-        _plot(origin, f"{title}, {words}", until=layout.active, parts=parts)
+        _plot(origin, f"{title}, {words}", until=layout.active, parts=parts, key=key)
         for origin, title in titles
     ]
     return [*first, *whole]
@@ -178,8 +186,9 @@ def _spans(
 
 def _kept(group: Group, bands: Mapping[str, float], paths: Mapping[str, str]) -> rrb.TimeSeriesView:
     own = [signal for signal in group.signals if signal in bands]
-    title = f"{group.title} within {'its bound' if len(own) == 1 else 'bounds'} [{group.unit}]"
     half = 1.6 * max(bands[signal] for signal in own)
+    words = "its bound" if len(own) == 1 else "bounds"
+    title = f"{group.title} within {words}, ±{half:.2g} [{group.unit}]"
     return _plot(group.name, title, half=half, bounds=[paths[signal] for signal in own])
 
 
@@ -199,8 +208,14 @@ def _near_and_planes(layout: Layout, following: bool) -> rrb.Vertical:
     near = min(NEAR, layout.duration / 10)
     channels = [f"{name}/**" for name in layout.acting]
     thrust = [
-        _plot("thrust", f"Thrust near the cursor [{layout.unit}]", near=near, parts=channels),
-        *_spans([("thrust", "Thrust", layout.unit)], layout, channels),
+        _plot(
+            "thrust",
+            f"Thrust near the cursor [{layout.unit}]",
+            near=near,
+            parts=channels,
+            key=len(channels) <= FEW,
+        ),
+        *_spans([("thrust", "Thrust", layout.unit)], layout, channels, len(channels) <= FEW),
     ]
     # Pulses are seen from near, a torque that follows its command from afar.
     thrust = thrust if layout.relays else [*thrust[1:], thrust[0]]

@@ -42,17 +42,17 @@ def verdict_table(verdicts: Sequence[Verdict]) -> list[str]:
     Args:
         verdicts: The verdicts.
     """
-    lines = ["|  | claim | predicted | measured | bound | margin | worst at | source |"]
-    lines.append("|:-:|:--|--:|--:|--:|--:|--:|:--|")
+    lines = ["|  | margin | claim | measured | bound | predicted | worst at | source |"]
+    lines.append("|:-:|--:|:--|--:|--:|--:|--:|:--|")
     for v in verdicts:
-        claim = f"{'holds' if v.holds else f'**{v.outcome}**'} | {cell(v.claim)}"
+        word = "holds" if v.holds else f"**{v.outcome}**"
         expected = "" if v.predicted is None else f"{v.predicted:.4g}"
         bound = f"{'±' if v.kind == 'within' else '≤ '}{v.bound:.3g} {v.unit}"
         worst = "" if v.t_worst is None else f"{v.t_worst:.2f} s"
         judged = v.outcome != "not judged"
         found, margin = (f"{v.measured:.4g}", f"{100 * v.margin:.3g} %") if judged else ("", "")
-        figures = f"{expected} | {found} | {bound} | {margin} | {worst}"
-        lines.append(f"| {claim} | {figures} | {cell(v.source)} |")
+        figures = f"{found} | {bound} | {expected} | {worst}"
+        lines.append(f"| {word} | {margin} | {cell(v.claim)} | {figures} | {cell(v.source)} |")
     return lines
 
 

@@ -23,6 +23,7 @@ class Group:
         role: What they are to the motion.
         signals: Their names.
         labels: Their names in a key.
+        size: The largest magnitude, or range of a tip, in flights that are known.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Group:
     role: Role
     signals: tuple[str, ...]
     labels: tuple[str, ...]
+    size: float
 
 
 _VECTORS: tuple[tuple[str, str, Role], ...] = (
@@ -88,6 +90,7 @@ def _group(
         role=role,
         signals=tuple(kept),
         labels=tuple(kept.values()),
+        size=max(largest.values()),
     )
 
 
