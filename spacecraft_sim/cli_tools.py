@@ -36,14 +36,16 @@ def compare(arguments: argparse.Namespace) -> int:
     from spacecraft_sim import pair_folder, run_folder, run_pair
 
     factor = terminal.exaggeration(arguments)
-    compared = run_pair.pair(run_pair.read(arguments.a), run_pair.read(arguments.b))
-    name = f"{arguments.a.resolve().name}-and-{arguments.b.resolve().name}"
+    a, b = arguments.a, arguments.b
+    compared = run_pair.pair(run_pair.read(a), run_pair.read(b))
+    name = f"{a.resolve().name}-and-{b.resolve().name}"
     folder = run_folder.create(arguments.out, name)
     pair_folder.write(folder, compared, factor)
-    table = Table("", "A", "B", "B - A", box=None)
+    heads = "\n".join(f"{x}: {escape(str(run))}" for x, run in (("A", a), ("B", b)))
+    table = Table("", "A", "B", "B - A", box=None, title=heads, title_justify="left")
     for heading, rows in run_pair.table(compared):
         table.add_row(f"[bold]{heading}[/]")
-        for what, *values in rows or [("none",)]:
+        for what, *values in rows:
             table.add_row(f"  {escape(what)}", *values)
     console = terminal.console()
     console.print(table)

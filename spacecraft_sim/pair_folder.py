@@ -16,12 +16,11 @@ def write(folder: Path, compared: Pair, factor: float | None) -> None:
     """
     run_pair.write_json(folder / "comparison.json", compared)
     a, b = compared.a, compared.b
-    names = [f"{run.mission.scenario.name} ({run.folder.resolve().name})" for run in (a, b)]
     plots_pair.page(
         folder / "comparison.png",
         a=a.flight,
         b=b.flight,
-        title=f"A: {names[0]},  B: {names[1]}",
+        title=f"A: {a.title},  B: {b.title}",
         booms=[x.name for x in a.mission.machine.booms if x.name in _booms(b)],
         bands=(a.mission.bands, b.mission.bands),
         table=run_pair.table(compared),

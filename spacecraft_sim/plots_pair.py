@@ -3,6 +3,7 @@
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from spacecraft_sim import spans
 from spacecraft_sim.plots import DPI, GOOD, INK, SOFT, WIDTH, panel, prefix
+from spacecraft_sim.plots_table import fit
 from spacecraft_sim.signal_groups import Group, groups
 from spacecraft_sim.trajectory import Trajectory, channel_units, moving_axes
 
@@ -20,10 +23,14 @@ Table = Sequence[tuple[str, Sequence[tuple[str, ...]]]]
 
 RUNS = (("#f29b38", 2.8), ("#1f6fd6", 1.1))  # colour and width: B thin over A
 DASHES = ("-", "--", ":", "-.")
-NEAR = 12.0  # s of thrust at the start and at the end
+NEAR = 12.0  # s of thrust in a panel
+UNLIKE = 10.0  # times as strong are thrusts that need a scale of their own
+CYCLES = 4  # of a limit cycle, of which hundreds would be a band
 PANEL, LINE = 3.5, 0.165  # heights of a panel with its key, and of a line of the table, inches
-COLUMNS = (0.645, 0.83, 1.0)  # right edges of those of the table after the first
-LETTERS = 50  # of a line of the first column
+TITLE = (17, 14, 11)  # sizes of its letters, points
+ACROSS, STACKS = 4, 3  # panels in a row at most, and parts of the table beside each other
+COLUMNS = (0.64, 0.835, 1.0)  # right edges of those of the table after the first
+LETTERS, INDENT = 47, "   "  # of a line of the first column
 
 
 def page(
@@ -56,24 +63,35 @@ def page(
     axis = next(iter(moving_axes(a, "quasi_rigid_angle")), "")
     plane = f"quasi_rigid_angle_{axis}", f"quasi_rigid_rate_{axis}"
     if all(name in flight.signals for name in plane for flight in (a, b)):
-        panels += [partial(_phase_plane, flights=flights, names=plane, share=s) for s in (0.0, 0.9)]
-    panels += [partial(_thrust, flights=flights, share=share) for share in (0.0, 1.0)]
-    rows = -(-len(panels) // 2)
-    lines = _lines(table)
-    height = max(PANEL * rows + 0.6, LINE * (len(lines) + 1) + 1.1)
+        planes = (
+            partial(_phase_plane, flights=flights, names=plane, late=k) for k in (False, True)
+        )
+        panels += planes
+    thrust = [partial(_thrust, flights=flights), partial(_thrust_at_the_end, flights=flights)]
+    rows = [*_rows(panels), thrust]
+    stacks = _stacks(_lines(table))
+    longest = max(map(len, stacks))
+    height = PANEL * len(rows) + LINE * (longest + 1) + 0.75
     figure = Figure(figsize=(WIDTH, height), dpi=DPI)
     FigureCanvasAgg(figure)
-    style = {"size": 17, "weight": "bold", "color": INK, "va": "center"}
-    figure.text(0.012, 1 - 0.3 / height, title, **style)
-    grid = figure.add_gridspec(
-        rows, 2, left=0.045, right=0.62, top=1 - 0.85 / height,
-        bottom=1 - (PANEL * rows - 0.5) / height, hspace=0.62, wspace=0.2,
-    )  # fmt: skip
-    for k, draw in enumerate(panels):
-        draw(figure.add_subplot(grid[k // 2, k % 2]))
-    tall = LINE * (len(lines) + 1) / height
-    _table(figure.add_axes((0.65, 1 - 0.6 / height - tall, 0.34, tall)), lines)
+    heading = figure.text(0.012, 1 - 0.3 / height, title, weight="bold", color=INK, va="center")
+    fit(heading, 0.976 * figure.bbox.width, TITLE)
+    for k, row in enumerate(rows):
+        edges = {"top": 1 - (0.85 + PANEL * k) / height, "bottom": 1 - (3.05 + PANEL * k) / height}
+        grid = figure.add_gridspec(1, len(row), left=0.045, right=0.965, wspace=0.2, **edges)
+        for cell, draw in zip([*grid], row, strict=True):  # pyright: ignore
+            draw(figure.add_subplot(cell))
+    for k, lines in enumerate(stacks):
+        tall, wide = LINE * (longest + 1) / height, 0.976 / STACKS
+        place = (0.012 + k * wide, 0.1 / height, wide - 0.02 * (k + 1 < STACKS), tall)
+        _table(figure.add_axes(place), lines, longest)
     figure.savefig(path, pil_kwargs={"compress_level": 3})
+
+
+def _rows(panels: Sequence[Callable[[Axes], None]]) -> list[Sequence[Callable[[Axes], None]]]:
+    """Rows of about one length, each of which fills the page."""
+    edges = np.linspace(0, len(panels), -(-len(panels) // ACROSS) + 1).round().astype(int)
+    return [panels[a:b] for a, b in pairwise(edges)]
 
 
 def _history(
@@ -104,39 +122,107 @@ def _history(
     _key(axes)
 
 
-def _phase_plane(axes: Axes, *, flights: Named, names: tuple[str, str], share: float) -> None:
-    """Rate over angle, for the whole flight or its last part."""
-    late = [flight.time >= share * flight.time[-1] for _, flight in flights]
+def _phase_plane(axes: Axes, *, flights: Named, names: tuple[str, str], late: bool) -> None:
+    """Rate over angle, for the whole flight or its last cycles."""
+    shown = [
+        flight.time >= (spans.last_cycles(flight, CYCLES) if late else flight.time[0])
+        for _, flight in flights
+    ]
     scales = [
-        prefix(max(_peak(f[name][rows]) for (_, f), rows in zip(flights, late, strict=True)))
+        prefix(max(_peak(f[name][rows]) for (_, f), rows in zip(flights, shown, strict=True)))
         for name in names
     ]
     (sx, px), (sy, py) = scales
-    for (run, flight), (color, width), rows in zip(flights, RUNS, late, strict=True):
+    for (run, flight), (color, width), rows in zip(flights, RUNS, shown, strict=True):
         x, y = (flight[name][rows] for name in names)
         axes.plot(x / sx, y / sy, color=color, linewidth=width, label=run)
     axis = names[0][-1]
     labels = f"quasi-rigid angle {axis}, {px}rad", f"quasi-rigid rate {axis}, {py}rad/s"
-    panel(axes, f"Phase plane, {'last tenth' if share else 'whole flight'}", *labels)
+    panel(axes, f"Phase plane, {'last cycles of each' if late else 'whole flight'}", *labels)
     _key(axes)
 
 
-def _thrust(axes: Axes, *, flights: Named, share: float) -> None:
-    """The first channels of both, as delivered, over the first or the last seconds."""
+def _thrust(axes: Axes, *, flights: Named) -> None:
+    """As delivered, while it changes most; the whole of a flight that is short."""
+    start, end = busiest([flight for _, flight in flights])
+    unit = _channels(axes, flights, (start, end), (0.0, 0.0))
+    panel(axes, f"Thrust as delivered, where it changes most, {unit}", "time, s")
+    _key(axes)
+
+
+def _thrust_at_the_end(axes: Axes, *, flights: Named) -> None:
+    """As delivered, the ends of flights of whatever lengths over each other."""
+    ends = [float(flight.time[-1]) for _, flight in flights]
+    unit = _channels(axes, flights, (-min(NEAR, *ends), 0.0), ends)
+    panel(
+        axes,
+        f"Thrust as delivered, to the end of each, {unit}",
+        f"time from the end, s, of A at {ends[0]:g} s and of B at {ends[1]:g} s",
+    )
+    _key(axes)
+
+
+def _channels(axes: Axes, flights: Named, span: tuple[float, float], zeros: Sequence[float]) -> str:
+    """Draws the first channels over times from the zeros; returns their units."""
     units = [channel_units(flight) for _, flight in flights]
     channels = [*dict.fromkeys(name for found in units for name in found)]
-    end = share * min(float(flight.time[-1]) for _, flight in flights)
-    start = max(end - NEAR, 0.0)
-    for (run, flight), (color, width) in zip(flights, RUNS, strict=True):
-        own = [channel for channel in channels if channel in flight.signals]
-        for channel, dashes in zip(own, DASHES, strict=False):
+    peaks, scales = [], (axes, axes)
+    shown = [
+        _between(flight.time - zero, span) for (_, flight), zero in zip(flights, zeros, strict=True)
+    ]
+    for found, (_, flight), rows in zip(units, flights, shown, strict=True):
+        peaks.append(max((_peak(flight[channel][rows]) for channel in found), default=0.0))
+    if 0 < UNLIKE * min(peaks) < max(peaks):  # on one scale the weaker would be a flat line
+        scales = axes, axes.twinx()
+        scales[1].tick_params(labelsize=8.5, colors=RUNS[1][0], length=3)
+        scales[1].spines[:].set_visible(False)
+        for own, peak in zip(scales, peaks, strict=True):
+            own.set_ylim(-1.1 * peak, 1.1 * peak)
+    for k, ((run, flight), (color, width), rows) in enumerate(
+        zip(flights, RUNS, shown, strict=True)
+    ):
+        for channel, dashes in zip((c for c in channels if c in units[k]), DASHES, strict=False):
             look = {"color": color, "linewidth": width, "linestyle": dashes}
-            axes.step(flight.time, flight[channel], where="post", label=f"{run}: {channel}", **look)
-    axes.set_xlim(start, start + NEAR)
-    when = "to the end" if share else "from the start"
-    kinds = " or ".join(sorted({unit for found in units for unit in found.values()}))
-    panel(axes, f"Thrust as delivered, {when}, {kinds}", "time, s")
-    _key(axes)
+            time, thrust = flight.time[rows] - zeros[k], flight[channel][rows]
+            (line,) = scales[k].step(time, thrust, where="post", label=f"{run}: {channel}", **look)
+            if scales[k] is not axes:  # whose key it is to stand in
+                axes.plot([], [], label=line.get_label(), **look)
+    axes.set_xlim(*span)
+    kinds = [" or ".join(sorted(set(found.values()))) for found in units]
+    if scales[0] is scales[1]:
+        return " or ".join(sorted({unit for found in units for unit in found.values()}))
+    return f"A: {kinds[0]}, on the left; B: {kinds[1]}, on the right"
+
+
+def _between(time: Array, span: tuple[float, float]) -> slice:
+    """The rows in a span, the one before it, which still holds, and the one after it."""
+    first = max(int(np.searchsorted(time, span[0], side="right")) - 1, 0)
+    return slice(first, int(np.searchsorted(time, span[1], side="right")) + 1)
+
+
+def busiest(flights: Sequence[Trajectory]) -> tuple[float, float]:
+    """Returns when the thrusts change most, beside their own peaks, before the end of a flight.
+
+    Args:
+        flights: The flights.
+
+    Returns:
+        From when until when, s; the whole of the shortest flight if it is short.
+    """
+    end = min(float(flight.time[-1]) for flight in flights)
+    if end <= 2 * NEAR:
+        return 0.0, end
+    starts = np.arange(0.0, end - 2 * NEAR, NEAR / 12)
+    total = np.zeros(len(starts))
+    for flight in flights:
+        for channel in channel_units(flight):
+            change = np.abs(np.diff(flight[channel], prepend=0.0))
+            way = np.r_[0.0, np.cumsum(change / (_peak(flight[channel]) or 1.0))]
+            edges = (np.searchsorted(flight.time, starts + after) for after in (0.0, NEAR))
+            before, then = (way[edge] for edge in edges)
+            total += then - before
+    start = float(starts[np.argmax(total.round(9))])  # the first of equal ones
+    return start, start + NEAR
 
 
 def _key(axes: Axes) -> None:
@@ -153,15 +239,28 @@ def _lines(table: Table) -> list[tuple[str, ...]]:
     lines: list[tuple[str, ...]] = []
     for heading, rows in table:
         lines.append((heading.upper(),))
-        for what, *figures in rows or [("none", "")]:
-            first, *more = textwrap.wrap(what, LETTERS, subsequent_indent="   ") or [""]
+        for what, *figures in rows:
+            first, *more = textwrap.wrap(what, LETTERS, subsequent_indent=INDENT) or [""]
             lines += [(first, *figures), *((part, "") for part in more)]
     return lines
 
 
-def _table(axes: Axes, lines: Sequence[tuple[str, ...]]) -> None:
+def _stacks(lines: Sequence[tuple[str, ...]]) -> list[Sequence[tuple[str, ...]]]:
+    """Parts of about one length; none parts a heading or a name from the line below it."""
+    edges = [0]
+    for k in range(1, STACKS):
+        edge = max(round(len(lines) * k / STACKS), edges[-1])
+        while edge < len(lines) and (
+            len(lines[edge - 1]) == 1 or lines[edge][0].startswith(INDENT)
+        ):
+            edge += 1
+        edges.append(edge)
+    return [lines[a:b] for a, b in pairwise([*edges, len(lines)])]
+
+
+def _table(axes: Axes, lines: Sequence[tuple[str, ...]], longest: int) -> None:
     axes.set_axis_off()
-    axes.set(xlim=(0, 1), ylim=(len(lines), -1))
+    axes.set(xlim=(0, 1), ylim=(longest, -1))
     for head, x in zip(("A", "B", "B - A"), COLUMNS, strict=True):
         axes.text(x, -0.5, head, size=9, weight="bold", color=SOFT, ha="right", va="center")
     for k, (what, *figures) in enumerate(lines):

@@ -36,7 +36,7 @@ def table(axes: Axes, verdicts: Sequence[Verdict]) -> None:
             style: dict[str, Any] = {"ha": side, "va": "center", "color": color}
             drawn = axes.text(x, k + 0.5, _cell(v, head), size=_SIZES[0], **style)
             if head == "claim":
-                _fit(drawn, 0.46 * box.width)
+                fit(drawn, 0.46 * box.width)
     for k, v in enumerate(verdicts, start=1):
         color, mark = (GOOD, "✔") if v.holds else (BAD, "✘")
         axes.add_patch(Rectangle((0, k + 0.1), 0.006, 0.8, color=color, linewidth=0))
@@ -59,10 +59,16 @@ def _cell(v: Verdict, head: str) -> str:
     return {"measured": f"{v.measured:.4g}", "bound": bound, "unit": v.unit, "margin": margin}[head]
 
 
-def _fit(drawn: Text, width: float) -> None:
-    """Makes a text small enough, and short if that is not enough."""
+def fit(drawn: Text, width: float, sizes: Sequence[float] = _SIZES) -> None:
+    """Makes a text small enough, and short if that is not enough.
+
+    Args:
+        drawn: The text.
+        width: How wide it may be, pixels.
+        sizes: Of its letters, points: the first that fits, or the last.
+    """
     have = drawn.get_window_extent().width
-    for size in _SIZES:
+    for size in sizes:
         drawn.set_fontsize(size)
         have = drawn.get_window_extent().width
         if have <= width:

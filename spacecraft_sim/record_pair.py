@@ -23,7 +23,7 @@ def write(path: Path, compared: Pair, factor: float | None = None) -> None:
     below, above = run_folder.subject(a.mission), run_folder.subject(b.mission)
     names = {chart.name for chart in above.charts}
     subject = Subject(
-        title=f"A: {_name(a)}, B: {_name(b)}",
+        title=f"A: {a.title}, B: {b.title}",
         scenario=f"# A: {a.folder}\n{below.scenario}\n\n# B: {b.folder}\n{above.scenario}",
         model=above.model,
         machine=above.machine,
@@ -64,17 +64,13 @@ def page(compared: Pair, notes: Sequence[str]) -> str:
         compared: The runs.
         notes: What is to be said of the recording.
     """
-    lines = [f"# A: {_name(compared.a)}, B: {_name(compared.b)}", *notes]
+    lines = [f"# A: {compared.a.title}, B: {compared.b.title}", *notes]
     for heading, rows in table(compared):
         lines += ["", f"**{heading}**", "", "|  | A | B | B - A |", "|:--|--:|--:|--:|"]
         lines += [f"| {' | '.join(cell(text) for text in row)} |" for row in rows]
     for word, run in (("A", compared.a), ("B", compared.b)):
         lines += ["", f"**claims of {word}**", "", *verdict_table(run.verdicts)]
     return "\n".join(lines)
-
-
-def _name(run: Run) -> str:
-    return f"{run.mission.scenario.name} ({run.folder.name})"
 
 
 def _factor(run: Run) -> float:

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from spacecraft_sim.versions import versions
 Array = np.ndarray
 Figures = dict[tuple[str, str], float | None]  # by name and unit; None if there is no such figure
 LATE = 0.1  # share of a flight that counts as its end
+SAME = ("identical", "", "", "")  # a row of the table where nothing differs
 _WORDS = ("name", "title", "description", "versions")  # of a scenario: they fly nothing
 
 
@@ -37,6 +38,11 @@ class Run:
     mission: Mission
     flight: Trajectory
     verdicts: tuple[Verdict, ...]
+
+    @property
+    def title(self) -> str:
+        """Names of the scenario and of the folder."""
+        return f"{self.mission.scenario.name} ({self.folder.resolve().name})"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,13 +176,22 @@ def table(compared: Pair) -> list[tuple[str, list[tuple[str, ...]]]]:
         ("figures of the flights", compared.figures),
         ("claims, as measured", compared.claims),
     )
-    lines = [(heading, [_cells(row) for row in rows]) for heading, rows in groups]
-    signals = [
+    lines = [(heading, [_cells(row) for row in rows] or [SAME]) for heading, rows in groups]
+    return [*lines, ("signals", _differing(compared.signals))]
+
+
+def _differing(signals: Sequence[Difference]) -> list[tuple[str, ...]]:
+    """The motions that differ; if none does, what there is to say of the signals."""
+    found = [
         (d.signal, "", "", f"at most {d.max_error:.4g} {d.unit}, rms {d.rms_error:.4g}")
-        for d in compared.signals
+        for d in signals
         if d.unit in ("rad", "rad/s", "m") and "." not in d.signal and d.max_error > 0
     ]
-    return [*lines, ("signals", signals)]
+    if not signals:
+        return [("no signal in common", "", "", "")]
+    if any(d.max_error > 0 for d in signals):
+        return found or [("no angle, rate or deflection differs", "", "", "")]
+    return [SAME]
 
 
 def _cells(row: Row) -> tuple[str, ...]:

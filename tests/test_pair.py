@@ -1,6 +1,7 @@
 """Two runs beside each other: one table, one figure, one recording."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import rrd
 from matplotlib.figure import Figure
 from written import faults, texts
 
-from spacecraft_sim import cli, pair_folder, run_pair
+from spacecraft_sim import cli, pair_folder, plots_pair, run_pair
 from spacecraft_sim.trajectory import Trajectory, channel_units
 
 NAME = "efremov-nonlocal"
@@ -149,7 +150,7 @@ def test_units_are_those_of_the_channels_and_booms_those_of_the_machine(runs):
 
 @pytest.mark.parametrize(
     ("a", "b"), [("one", "seed"), ("one", "local"), ("free", "boom"), ("boom", "arm"),
-                 ("axes", "seed")]
+                 ("axes", "seed"), ("one", "one")]
 )  # fmt: skip
 def test_all_that_is_written_in_the_figure_can_be_read(a, b, runs, tmp_path, monkeypatch):
     kept, save = [], Figure.savefig
@@ -164,8 +165,117 @@ def test_all_that_is_written_in_the_figure_can_be_read(a, b, runs, tmp_path, mon
         units |= set(found.values())
         for channel in found:
             assert f"{key}: {channel}" in named
-    assert f"from the start, {' or '.join(sorted(units))}" in named
+    thrusts = [words for words, _ in texts(figure) if words.startswith("Thrust as delivered, ")]
+    assert len(thrusts) == 2
+    assert all(unit in title for title in thrusts for unit in units)
     assert (units == {"N", "N m"}) == (a in ("free", "axes"))  # which have forces
+
+
+def drawn(runs, monkeypatch, tmp_path, a, b):
+    """The panels of the figure of two runs by title, and the figure."""
+    kept, save = [], Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda f, *x, **k: (kept.append(f), save(f, *x, **k)))
+    pair_folder.write(tmp_path, compared(runs, a, b), None)
+    return {axes.get_title(loc="left"): axes for axes in kept[0].axes}, kept[0]
+
+
+def relay(end, busy=(0.0, 0.0), strength=1.0, period=0.5):
+    """A flight whose relay stands still but for a while."""
+    time = np.linspace(0.0, end, round(100 * end) + 1)
+    inside = (busy[0] <= time) & (time < busy[1])
+    thrust = strength * np.where(inside & (np.floor(time / period) % 2 == 1), 1.0, -1.0)
+    signals = {"jet": thrust, "jet_command": thrust}
+    return Trajectory(time=time, signals=signals, units=dict.fromkeys(signals, "N"))
+
+
+def test_thrust_is_shown_where_it_changes_most():
+    start, end = plots_pair.busiest([relay(100.0, (41.0, 53.0)), relay(120.0)])
+    assert end - start == plots_pair.NEAR
+    assert start == pytest.approx(41.0, abs=1.0)  # windows begin a twelfth of one apart
+    # However strong: each is measured against its own peak.
+    flights = relay(100.0, (60.0, 64.0), strength=50.0), relay(100.0, (30.0, 42.0), strength=0.1)
+    assert plots_pair.busiest(flights)[0] == pytest.approx(30.0, abs=1.0)
+    assert plots_pair.busiest([relay(20.0, (2.0, 9.0)), relay(900.0)]) == (0.0, 20.0)
+
+
+def test_the_end_of_each_flight_is_shown_whatever_their_lengths():
+    flights = relay(100.0, (90.0, 100.0)), relay(75.0, (70.0, 75.0))
+    axes = Figure().add_subplot()
+    plots_pair._thrust_at_the_end(axes, flights=(("A", flights[0]), ("B", flights[1])))
+    low, high = axes.get_xlim()
+    assert (low, high) == (-plots_pair.NEAR, 0.0)
+    for flight, line in zip(flights, axes.lines, strict=True):
+        x, y = map(np.asarray, line.get_data())
+        assert x[0] <= low
+        assert x[-1] == 0.0
+        seen = flight.time >= flight.time[-1] + low
+        changes = np.count_nonzero(np.diff(flight["jet"][seen]))
+        assert np.count_nonzero(np.diff(y)) == changes > 5
+    assert "A at 100 s and of B at 75 s" in axes.get_xlabel()
+
+
+def test_a_weaker_thrust_has_a_scale_of_its_own():
+    for ratio, count in ((2.0, 1), (50.0, 2)):
+        figure = Figure()
+        flights = ("A", relay(30.0, (0.0, 30.0))), ("B", relay(30.0, (0.0, 30.0), ratio))
+        plots_pair._thrust(figure.add_subplot(), flights=flights)
+        assert len(figure.axes) == count
+        for axes, strength in zip(figure.axes, (1.0, ratio), strict=False):
+            assert axes.get_ylim()[1] < 1.3 * (ratio if count == 1 else strength)
+        assert figure.axes[0].get_legend_handles_labels()[1] == ["A: jet", "B: jet"]
+
+
+def test_the_last_cycles_are_few():
+    time = np.linspace(0.0, 1000.0, 100_001)
+    turn = 2 * np.pi * time
+    signals = {"quasi_rigid_angle_z": np.cos(turn), "quasi_rigid_rate_z": -np.sin(turn),
+               "jet": np.sign(np.sin(turn)), "jet_command": np.sign(np.sin(turn))}  # fmt: skip
+    flight = Trajectory(time=time, signals=signals, units=dict.fromkeys(signals, "rad"))
+    axes, names = Figure().add_subplot(), ("quasi_rigid_angle_z", "quasi_rigid_rate_z")
+    plots_pair._phase_plane(axes, flights=(("A", flight), ("B", flight)), names=names, late=True)
+    for line in axes.lines:
+        x, y = line.get_data()
+        turns = np.ptp(np.unwrap(np.arctan2(y, x))) / (2 * np.pi)
+        assert 1 <= turns <= plots_pair.CYCLES + 1  # the last one may have just begun
+
+
+@pytest.mark.parametrize(("a", "b"), [("one", "one"), ("one", "arm"), ("one", "local")])
+def test_no_half_of_the_page_is_blank(a, b, runs, monkeypatch, tmp_path):
+    _, figure = drawn(runs, monkeypatch, tmp_path, a, b)
+    boxes = [box for _, box in texts(figure)] + [axes.bbox for axes in figure.axes if axes.axison]
+    page = figure.bbox
+    for x in np.linspace(0.05, 0.95, 19):  # no upright strip is blank for half of the height
+        here = [
+            box
+            for box in boxes
+            if box.x0 <= (x + 0.05) * page.x1 and box.x1 >= (x - 0.05) * page.x1
+        ]
+        edges = np.sort([0.0, page.y1, *(y for box in here for y in (box.y0, box.y1))])
+        assert np.diff(edges).max() < 0.5 * page.y1
+
+
+def test_what_does_not_differ_is_said_to_be_identical_and_what_is_not_shared_to_be_so(runs):
+    same = dict(run_pair.table(compared(runs, "one", "one")))
+    assert [row[0] for row in same["settings"]] == ["identical"]
+    assert [row[0] for row in same["signals"]] == ["identical"]
+    other = dict(run_pair.table(compared(runs, "one", "arm")))
+    assert [row[0] for row in other["signals"]] == ["no signal in common"]
+    assert len(other["settings"]) > 10
+    seed = dict(run_pair.table(compared(runs, "one", "seed")))
+    assert "attitude_z" in [row[0] for row in seed["signals"]]
+    found = compared(runs, "one", "one")
+    spent = [replace(d, max_error=1.0 if d.unit.endswith("s") and "spent" in d.signal else 0.0)
+             for d in found.signals]  # fmt: skip
+    words = dict(run_pair.table(replace(found, signals=tuple(spent))))["signals"][0][0]
+    assert words == "no angle, rate or deflection differs"
+
+
+def test_the_printed_table_names_the_folders(runs, tmp_path, capsys):
+    words = ["compare", str(runs / "one"), str(runs / "arm"), "--out", str(tmp_path / "out")]
+    assert cli.main(words) == 0
+    head = "".join(capsys.readouterr().out.split("settings")[0].split())  # a long path is broken
+    assert f"A:{runs / 'one'}" in head
+    assert f"B:{runs / 'arm'}" in head
 
 
 @pytest.mark.parametrize("missing", ["scenario.toml", "trajectory.parquet"])

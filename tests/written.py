@@ -7,10 +7,12 @@ def texts(figure):
     for axes in figure.axes:
         found += [axes.title, axes._left_title, axes._right_title, *axes.texts]
         found += axes.get_legend().get_texts() if axes.get_legend() else []
-        for axis in (axes.xaxis, axes.yaxis) if axes.axison else ():
+        for axis in (a for a in (axes.xaxis, axes.yaxis) if axes.axison and a.get_visible()):
             low, high = sorted(axis.get_view_interval())
             ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
-            found += [tick.label1 for tick in ticks if low <= tick.get_loc() <= high]
+            inside = [tick for tick in ticks if low <= tick.get_loc() <= high]
+            labels = [label for tick in inside for label in (tick.label1, tick.label2)]
+            found += [label for label in labels if label.get_visible()]
             found.append(axis.get_offset_text())
     return [(x.get_text(), box) for x in found if (box := x.get_window_extent()).width > 0]
 
