@@ -68,6 +68,7 @@ class Drawing:
         booms: Bodies of each boom from root to tip, by boom name.
         tips: Position of each boom's tip in its last body, by boom name, m.
         turned: How many times too far sprung joints are turned.
+        bending: How many times too far booms, which are as they are, are to be drawn bent.
     """
 
     shapes: tuple[Shape, ...]
@@ -78,6 +79,7 @@ class Drawing:
     booms: dict[str, tuple[str, ...]]
     tips: dict[str, Array]
     turned: float = 1.0
+    bending: float = 1.0
 
 
 def draw(
@@ -86,7 +88,7 @@ def draw(
     trajectory: Trajectory,
     *,
     frames: int = 2000,
-    turning: float = 1.0,
+    factor: float = 1.0,
 ) -> Drawing:
     """Draws a flight from its recorded coordinates.
 
@@ -95,7 +97,7 @@ def draw(
         spacecraft: The machine.
         trajectory: A flight of the MuJoCo plant.
         frames: How many instants at most; the rows are thinned evenly.
-        turning: How many times too far sprung joints are turned.
+        factor: How many times too far elastic parts are drawn.
 
     Returns:
         Shapes and motion.
@@ -104,8 +106,8 @@ def draw(
     names = list(trajectory.signals)[-model.nq :]
     coordinates = np.column_stack([trajectory[name][rows] for name in names])
     joints = sprung_joints(model, spacecraft)
-    if turning != 1.0:
-        _turn(model, joints, coordinates, turning)
+    if factor != 1.0:
+        _turn(model, joints, coordinates, factor)
     bodies = [model.body(b).name for b in range(1, model.nbody)]
     data = mujoco.MjData(model)
     positions, quaternions = np.zeros((2, len(rows), len(bodies), 4))
@@ -122,7 +124,8 @@ def draw(
         quaternions={name: quaternions[:, b] for b, name in enumerate(bodies)},
         booms={b.name: (f"{b.name}_0", *mjcf.hinge_names(b)) for b in spacecraft.booms},
         tips={b.name: model.site(f"{b.name}_tip").pos.copy() for b in spacecraft.booms},
-        turned=turning if joints else 1.0,
+        turned=factor if joints else 1.0,
+        bending=factor if spacecraft.booms else 1.0,
     )
 
 

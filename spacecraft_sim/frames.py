@@ -106,7 +106,7 @@ def simulated(model, machine: Spacecraft, part: Trajectory, factor: float) -> Fr
         part: The rows, with the machine's coordinates as their last signals.
         factor: How many times too far booms are bent, or sprung joints turned.
     """
-    drawing = draw(model, machine, part, frames=len(part.time), turning=factor)
+    drawing = draw(model, machine, part, frames=len(part.time), factor=factor)
     booms = {}
     for boom in drawing.booms:
         points, straight = boom_points(drawing, boom)
@@ -199,7 +199,8 @@ def suited_factor(model, machine: Spacecraft, flight: Trajectory) -> float:
     Args:
         model: The compiled spacecraft.
         machine: The machine.
-        flight: A flight of either plant.
+        flight: A flight of either plant; what is made of a run takes that of the reduced one, which
+            is known when the recording begins.
     """
     if joints := sprung_joints(model, machine):
         largest = max(1e-4, _largest_turn(model, joints, flight))

@@ -10,23 +10,23 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec, GridSpecBase
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from spacecraft_sim import spans
 from spacecraft_sim.drawing import Drawing
 from spacecraft_sim.guarantee import Verdict
 from spacecraft_sim.plots_film import BOOMS, INK, MINUS, PLUS, SOFT, film
+from spacecraft_sim.plots_panel import AXES, DPI, panel, prefix, time_axis
 from spacecraft_sim.plots_table import BAD, GOOD, ROW, table
 from spacecraft_sim.trajectory import Trajectory, between_rows, channel_units, moving_axes
 
 Array = np.ndarray
 Flights = tuple[Trajectory, Trajectory]  # of the reduced model and of the full plant
 
-WIDTH, DPI, FRAMES = 18.0, 100, 6  # inches, dots an inch, pictures in the film strip
+WIDTH, FRAMES = 18.0, 6  # inches, pictures in the film strip
 Plants = tuple[tuple[str, str, float], ...]  # name, colour and width of the lines of each
 PLANTS: Plants = (("reduced", "#f29b38", 3.2), ("MuJoCo", "#1f6fd6", 1.2))  # thin over wide
 SMOOTH: Plants = (("reduced: wide and pale", "#c3c9d4", 5.0), ("MuJoCo", INK, 1.2))  # many colours
-DASHES = ("-", (0, (4, 1.5)), (0, (1.2, 1.2)))  # of the axis that moves most, and of the others
+STAGGER = (0.15, 0.19)  # shares of a panel between names of its own bounds, and of the others
 REST = 1e-9  # share of the angle, and rad/s, that count as no motion
 FEW = 3000  # rows of a track that is drawn between them too
 DENSE = 160  # commands in a panel that would hide what they cross
@@ -124,71 +124,40 @@ def _key(
     figure: Figure, y: float, plants: Plants, axes: Sequence[str], bands: Mapping[str, float]
 ) -> None:
     """One key for the page, so that none covers a curve."""
-    entries = [(name, color, width, "-") for name, color, width in plants]
-    if len(axes) > 1:
-        entries += [(a, INK, 1.4, dashes) for a, dashes in zip(axes, DASHES, strict=False)]
+    entries = [
+        (f"{axis} {name}" if len(axes) > 1 else name, AXES[axis][1 - k], width)
+        for axis in sorted(axes)
+        for k, (name, _, width) in enumerate(plants)
+    ] or [*plants]
     if bands:
         asked = ", ".join(f"{signal[-1]} ±{half:.3g} rad" for signal, half in bands.items())
-        entries.append((f"asked: {asked}", GOOD, 1.4, "-"))
+        entries.append((f"asked: {asked}", GOOD, 1.4))
     x = 0.988
-    for name, color, width, dashes in reversed(entries):
+    for name, color, width in reversed(entries):
         text = figure.text(x, y, name, size=9.5, color=INK, ha="right", va="center")
         x = text.get_window_extent().x0 / figure.bbox.width - 0.005
-        look = {"color": color, "linewidth": width, "linestyle": dashes}
+        look = {"color": color, "linewidth": width}
         figure.add_artist(Line2D([x - 0.018, x], [y, y], transform=figure.transFigure, **look))
         x -= 0.03
 
 
-def panel(axes: Axes, title: str, x: str = "", y: str = "", below: bool = False) -> None:
-    """Gives axes the look of this house.
-
-    Args:
-        axes: The axes.
-        title: What they show.
-        x: Label of the x axis.
-        y: Label of the y axis.
-        below: Whether the key, if there is one, stands under the axes and not over them.
-    """
-    axes.set_title(title, size=10.5, color=INK, loc="left", y=1.0, weight="bold", pad=5)
-    axes.set_xlabel(x, size=9, color=SOFT, labelpad=2)
-    axes.set_ylabel(y, size=9, color=SOFT, labelpad=3)
-    axes.tick_params(labelsize=8.5, colors=SOFT, length=3)
-    axes.grid(color="#e3e7ee", linewidth=0.7)
-    axes.set_axisbelow(True)
-    for axis in (axes.xaxis, axes.yaxis):  # an offset would stand in the title
-        if isinstance(shown := axis.get_major_formatter(), ScalarFormatter):
-            shown.set_useOffset(False)
-            shown.set_scientific(False)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color("#b9c0cc")
-    handles = axes.get_legend_handles_labels()[0]
-    if handles:
-        deep = (0.45 if x else 0.19) * DPI / axes.get_window_extent().height  # under the ticks
-        place = {"loc": "upper left", "bbox_to_anchor": (0, -deep)} if below else {}
-        place = place or {"loc": "lower right", "bbox_to_anchor": (1.01, 0.985)}
-        rows = math.ceil(len(handles) / (4 if x else 6)) if below else 1
-        columns = math.ceil(len(handles) / rows)  # rows of one length
-        look = {"fontsize": 8.5, "frameon": False, "borderpad": 0.2}
-        if not x:  # a narrow panel
-            look |= {"handlelength": 1.0, "columnspacing": 0.9, "handletextpad": 0.4}
-        axes.legend(ncols=columns, **look, **place)
-
-
 def _angle(axes: Axes, flights: Flights, kind: str, bands: Mapping[str, float], zoom: bool) -> None:
-    """An angle with its own bands filled and those of the other angle dotted."""
+    """An angle with its own bands filled and those of the other angle dotted, all with names."""
     own = {name: half for name, half in bands.items() if name[:-2] == kind}
-    others = [half for name, half in bands.items() if name not in own]
-    shown = [*own.values(), *(others if zoom else ())]
+    others = {name: half for name, half in bands.items() if name not in own}
+    shown = [*own.values(), *(others.values() if zoom else ())]
     peak, scale, unit = _histories(axes, flights, kind, max(shown, default=0.0))
-    for name, half in own.items():
-        dashes = DASHES[moving_axes(flights[1], kind).index(name[-1]) % 3] if len(own) > 1 else "-"
+    for k, (name, half) in enumerate(own.items()):
         axes.axhspan(-half / scale, half / scale, color=GOOD, alpha=0.10, linewidth=0)
-        for limit in (-half / scale, half / scale):
-            axes.axhline(limit, color=GOOD, linewidth=1.4, linestyle=dashes)
-    if zoom:
-        for half in others:
-            for limit in (-half / scale, half / scale):
-                axes.axhline(limit, color=GOOD, linewidth=1, linestyle=":")
+        words = f"{name[-1]} ±{half / scale:.3g}", 0.995 - STAGGER[0] * k, "right"
+        _bound(axes, half / scale, words, AXES[name[-1]][0] if len(own) > 1 else GOOD, "-")
+    words = {"quasi_rigid_angle": "quasi-rigid", "attitude": "of the bus"}
+    for k, (name, half) in enumerate(others.items() if zoom else ()):
+        label = f"{name[-1]} {words[name[:-2]]}", 0.005 + STAGGER[1] * k, "left"
+        _bound(axes, half / scale, label, AXES[name[-1]][0] if len(others) > 1 else GOOD, ":")
+    low, high = axes.get_ylim()
+    outermost = 1.2 * max(shown, default=0.0) / scale  # with room for its name
+    axes.set_ylim(min(low, -outermost), max(high, outermost))
     limit = max(own.values(), default=0.0) / scale
     if zoom and len(own) == 1 and 0 < peak < 0.4 * limit:
         # Linear up to the peak, logarithmic to the limit: cycle and bound on one axis.
@@ -197,29 +166,39 @@ def _angle(axes: Axes, flights: Flights, kind: str, bands: Mapping[str, float], 
         axes.set_yticks([], minor=True)
         axes.set_ylim(-1.5 * limit, 1.5 * limit)
         unit += " (log beyond the peak)"
-    words = {"quasi_rigid_angle": "Quasi-rigid angle", "attitude": "Attitude of the bus"}
-    panel(axes, f"{words[kind]}, {unit}")
+    titles = {"quasi_rigid_angle": "Quasi-rigid angle", "attitude": "Attitude of the bus"}
+    panel(axes, f"{titles[kind]}, {unit}")
+
+
+def _bound(axes: Axes, half: float, label: tuple[str, float, str], color: str, dashes: str) -> None:
+    """Two lines, the upper with its name: what it says, where, and which end of it is there."""
+    for limit in (-half, half):
+        axes.axhline(limit, color=color, linewidth=1.4, linestyle=dashes)
+    words, x, side = label
+    place = {"transform": axes.get_yaxis_transform(), "ha": side, "va": "bottom", "zorder": 6}
+    ground = {"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 0.4}
+    axes.text(x, half, words, size=7.5, color=color, bbox=ground, **place)
 
 
 def _histories(
     axes: Axes, flights: Flights, kind: str, also: float = 0.0
 ) -> tuple[float, float, str]:
     """Draws the moving axes; returns their peak and a unit that suits it and `also`, with name."""
-    moving = moving_axes(flights[1], kind)
+    moving = moving_axes(flights[1], kind)  # the largest first, beneath the others
     drawn = [
-        (flight.time, flight[name], color, width, dashes)
-        for name, dashes in zip((f"{kind}_{axis}" for axis in moving), DASHES, strict=False)
-        for flight, (_, color, width) in zip(flights, PLANTS, strict=True)
-        if name in flight.signals
+        (flight.time, flight[f"{kind}_{axis}"], AXES[axis][1 - k], width)
+        for k, (flight, (_, _, width)) in enumerate(zip(flights, PLANTS, strict=True))
+        for axis in moving
+        if f"{kind}_{axis}" in flight.signals
     ]
+    unit = "rad/s" if kind == "rate" else "rad"
     peak = max((_peak(value) for _, value, *_ in drawn), default=0.0)
     base = 0.0 if also else _base([value for _, value, *_ in drawn])
     scale, letter = prefix(max([also, *(_peak(value - base) for _, value, *_ in drawn)]))
-    for time, value, color, width, dashes in drawn:
-        look = {"color": color, "linewidth": width, "linestyle": dashes}
-        axes.plot(time, (value - base) / scale, **look)
+    for time, value, color, width in drawn:
+        axes.plot(time, (value - base) / scale, color=color, linewidth=width)
     time_axis(axes, flights[1].time[0], flights[1].time[-1])
-    return peak / scale, scale, f"{letter}rad{_from(base, 'rad')}"
+    return peak / scale, scale, f"{letter}{unit}{_from(base, unit)}"
 
 
 def _base(values: Sequence[Array]) -> float:
@@ -236,24 +215,11 @@ def _from(base: float, unit: str) -> str:
     return f" from {base:.6g} {unit}" if base else ""
 
 
-def time_axis(axes: Axes, start: float, end: float) -> None:
-    """Sets the limits of a time axis, its ticks with their unit.
-
-    Args:
-        axes: The axes.
-        start: Where it begins, s.
-        end: Where it ends, s.
-    """
-    axes.set_xlim(start, end)
-    axes.xaxis.set_major_locator(MaxNLocator(6, steps=(1, 2, 5, 10)))
-    axes.xaxis.set_major_formatter(lambda t, _: f"{t:g} s")
-
-
 def _tips(axes: Axes, flights: Flights, booms: Sequence[str]) -> None:
     signals = [s for s in (f"{boom}_tip_y" for boom in booms) if s in flights[1].signals]
     if not signals:
         _, _, unit = _histories(axes, flights, "rate")
-        return panel(axes, f"Rate of the bus, {unit}/s")
+        return panel(axes, f"Rate of the bus, {unit}")
     scale, letter = prefix(max((_peak(flights[1][s]) for s in signals), default=0.0))
     for signal in signals:
         if signal in flights[0].signals:
@@ -284,8 +250,8 @@ def _phase_plane(axes: Axes, flights: Flights, bands: Mapping[str, float], zoom:
         axes.set(xticks=[], yticks=[])
         return panel(axes, f"Phase plane {axis}: at rest at {angle[-1]:.4g} rad")
     drawn = [
-        (flight, color, width)
-        for flight, (_, color, width) in zip(flights, PLANTS, strict=True)
+        (flight, AXES[axis][1 - k], width)
+        for k, (flight, (_, _, width)) in enumerate(zip(flights, PLANTS, strict=True))
         if x in flight.signals and y in flight.signals
     ]
     base = np.array([_base([flight[name] for flight, *_ in drawn]) for name in (x, y)])
@@ -301,9 +267,13 @@ def _phase_plane(axes: Axes, flights: Flights, bands: Mapping[str, float], zoom:
     if not zoom:
         axes.plot((angle[0] - base[0]) / sx, (rate[0] - base[1]) / sy, "o", color=INK, markersize=4)
         if half := bands.get(x, 0.0):
-            axes.axvspan(-half / sx, half / sx, color=GOOD, alpha=0.15, linewidth=0)
+            window = axes.get_xlim()
+            edges = (np.array([-half, half]) - base[0]) / sx
+            axes.axvspan(*edges, color=GOOD, alpha=0.15, linewidth=0)
+            if base[0]:  # the band reaches far beyond what is seen
+                axes.set_xlim(window)
     angles, rates = _from(base[0], "rad"), _from(base[1], "rad/s")
-    return panel(axes, f"Phase plane {axis}: {py}rad/s{rates} over {px}rad{angles}")
+    return panel(axes, f"Phase plane {axis}", f"angle, {px}rad{angles}", f"rate, {py}rad/s{rates}")
 
 
 def _lanes(
@@ -382,13 +352,3 @@ def _since(flight: Trajectory, start: float) -> Trajectory:
 
 def _peak(value: Array) -> float:
     return float(np.abs(value).max(initial=0.0))
-
-
-def prefix(peak: float) -> tuple[float, str]:
-    """Returns a scale that brings the peak above one half, and the prefix of the unit.
-
-    Args:
-        peak: The largest value, in the unit itself.
-    """
-    prefixes = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"), (1e-15, "f"))
-    return next((p for p in prefixes if peak >= p[0] / 2), prefixes[0])

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from spacecraft_sim.certificate import AxisCertificate
 from spacecraft_sim.certificate_curves import Curves
 from spacecraft_sim.certificate_words import promise
-from spacecraft_sim.plots import BAD, DPI, GOOD, INK, SOFT, panel
+from spacecraft_sim.plots import BAD, GOOD, INK, SOFT
+from spacecraft_sim.plots_panel import DPI, panel
 
 _WIDTH = 225  # letters of the result a line
 PRINTED, ANY, EXACT = GOOD, "#c98a00", "#1f6fd6"

@@ -22,7 +22,8 @@ from spacecraft_sim.chart import (
     pulses,
     worst_to_come,
 )
-from spacecraft_sim.plots import BAD, DPI, GOOD, INK, MINUS, PLUS, SOFT, panel, prefix
+from spacecraft_sim.plots import BAD, GOOD, INK, MINUS, PLUS, SOFT
+from spacecraft_sim.plots_panel import DPI, panel, prefix
 from spacecraft_sim.trajectory import Trajectory, between_rows
 
 Array = np.ndarray

@@ -37,7 +37,7 @@ def film(strip: list[Axes], drawing: Drawing, measured: Trajectory) -> str:
     frames = _frames(drawing, measured, len(strip))
     view, lines = sketch.view_of(drawing), sketch.boom_lines(drawing)
     lines = {name: (bent[frames], straight[frames]) for name, (bent, straight) in lines.items()}
-    factor = sketch.exaggeration(list(lines.values()))
+    factor = drawing.bending
     drawn = [_lines(lines, n, factor, view) for n in range(len(frames))]
     outlines = [_outlines(drawing, frame, view) for frame in frames]
     points = [p for parts in drawn for pair in parts for p in pair]

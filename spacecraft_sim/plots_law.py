@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 
 from spacecraft_sim import spans, sphere
 from spacecraft_sim.chart import Charts, History, Sphere, floor, histories, path_of, series, spheres
-from spacecraft_sim.plots import GOOD, INK, PLANTS, SOFT, Flights, panel, prefix, time_axis
+from spacecraft_sim.plots import GOOD, INK, PLANTS, SOFT, Flights
 from spacecraft_sim.plots_film import BOOMS, PLUS, SHADE
+from spacecraft_sim.plots_panel import panel, prefix, time_axis
 from spacecraft_sim.sketch import View
 from spacecraft_sim.trajectory import Trajectory
 

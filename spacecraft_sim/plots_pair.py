@@ -12,7 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from spacecraft_sim import spans
-from spacecraft_sim.plots import DPI, GOOD, INK, SOFT, WIDTH, panel, prefix
+from spacecraft_sim.plots import GOOD, INK, SOFT, WIDTH
+from spacecraft_sim.plots_panel import AXES, DPI, panel, prefix
 from spacecraft_sim.plots_table import fit
 from spacecraft_sim.signal_groups import Group, groups
 from spacecraft_sim.trajectory import Trajectory, channel_units, moving_axes
@@ -106,9 +107,11 @@ def _history(
     largest = max((half for band in own for half in band.values()), default=0.0)
     peak = max(_peak(flight[name]) for _, flight in flights for name in group.signals)
     scale, letter = prefix(largest or peak)
-    for (run, flight), (color, width), band in zip(flights, RUNS, own, strict=True):
+    for n, ((run, flight), (color, width), band) in enumerate(zip(flights, RUNS, own, strict=True)):
         for k, (name, label) in enumerate(zip(group.signals, group.labels, strict=True)):
             look = {"color": color, "linewidth": width, "linestyle": DASHES[k % len(DASHES)]}
+            if label in AXES:
+                look |= {"color": AXES[label][1 - n], "linestyle": "-"}
             axes.plot(flight.time, flight[name] / scale, label=f"{run}: {label}", **look)
         for half in band.values():
             axes.axhspan(-half / scale, half / scale, color=GOOD, alpha=0.08, linewidth=0)

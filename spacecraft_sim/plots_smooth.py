@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
 
 from spacecraft_sim.families import families
-from spacecraft_sim.plots import Flights, panel, prefix, time_axis
+from spacecraft_sim.plots import Flights
 from spacecraft_sim.plots_film import BOOMS
+from spacecraft_sim.plots_panel import panel, prefix, time_axis
 from spacecraft_sim.trajectory import Trajectory
 
 Panel = Callable[[Axes, Flights, bool], None]  # draws the whole flight, or its end

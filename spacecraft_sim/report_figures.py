@@ -175,7 +175,7 @@ def _craft(columns: Columns, drawing: Drawing) -> Figure:
     view, lines = sketch.view_of(drawing), sketch.boom_lines(drawing)
     frames = np.unique(np.linspace(0, len(drawing.time) - 1, FRAMES).astype(int))
     centre = next(iter(drawing.positions.values()))
-    factor, seen, bodies, booms = sketch.exaggeration(list(lines.values())), [], {}, []
+    factor, seen, bodies, booms = drawing.bending, [], {}, []
     for shape in sketch.solid_shapes(drawing):
         points = sketch.surface(shape)
         faces = sketch.BOX_FACES if shape.kind == "box" else ()

@@ -233,8 +233,8 @@ def write_pictures(
 
     title, charts = mission.scenario.title, charts_of(mission.controller)
     model, machine = mission.mujoco.model.ptr, mission.machine
-    factor = frames.suited_factor(model, machine, measured)
-    drawn = drawing.draw(model, machine, measured, turning=factor)
+    factor = frames.suited_factor(model, machine, predicted)
+    drawn = drawing.draw(model, machine, measured, factor=factor)
     plots.summary(
         folder / "summary.png",
         measured=measured,

@@ -13,7 +13,6 @@ from spacecraft_sim.drawing import Drawing, Jet, Shape, boom_points, turned
 Array = np.ndarray
 
 _FLAT = 1e-3  # share of a turn or of the length out of the plane that does not show
-_FACTORS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 _RING = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 _CORNERS = np.array(list(np.ndindex(2, 2, 2))) * 2.0 - 1
 # Corners of the six faces of a box, anticlockwise from outside.
@@ -119,20 +118,6 @@ def boom_lines(drawing: Drawing) -> dict[str, tuple[Array, Array]]:
     centre = next(iter(drawing.positions.values()))[:, None]
     lines = {boom: boom_points(drawing, boom) for boom in drawing.booms}
     return {boom: (bent - centre, straight - centre) for boom, (bent, straight) in lines.items()}
-
-
-def exaggeration(lines: Sequence[tuple[Array, Array]]) -> float:
-    """Returns a round factor that brings the largest deflection to about a quarter of its boom.
-
-    Args:
-        lines: Booms, bent and unbent, each of shape (n frames, n points, 3).
-    """
-    largest = 1e-4 if lines else 1.0
-    for bent, straight in lines:
-        length = np.linalg.norm(straight[:, -1] - straight[:, 0], axis=1)
-        off = np.linalg.norm(bent[:, -1] - straight[:, -1], axis=1)
-        largest = max(largest, float((off / length).max()))
-    return max(f for f in _FACTORS if f == 1 or f < 0.3 / largest)
 
 
 def exhausts(jet: Jet, shapes: Sequence[Shape], level: float) -> list[tuple[Array, Array]]:

@@ -10,6 +10,7 @@ from spacecraft_sim import drawing, mission
 from spacecraft_sim.chart import Line, Map, Portrait, Region
 from spacecraft_sim.compare import Comparison
 from spacecraft_sim.drawing import Drawing
+from spacecraft_sim.frames import suited_factor
 from spacecraft_sim.trajectory import Trajectory
 
 BOX = np.array([(-0.02, -0.01), (0.02, -0.01), (0.02, 0.01), (-0.02, 0.01), (-0.02, -0.01)])
@@ -86,10 +87,12 @@ def flown(*settings, name="efremov-nonlocal"):
     """A flight of a shipped scenario with some keys changed."""
     ready = mission.assemble(mission.load_scenario(name, settings, LAWS), LAWS)
     measured, predicted = ready.fly(), ready.fly("reduced")
+    model, machine = ready.mujoco.model.ptr, ready.machine
+    factor = suited_factor(model, machine, predicted)
     return Flown(
         mission=ready,
         measured=measured,
         predicted=predicted,
-        drawing=drawing.draw(ready.mujoco.model.ptr, ready.machine, measured),
+        drawing=drawing.draw(model, machine, measured, factor=factor),
         comparison=ready.judge(measured, predicted),
     )

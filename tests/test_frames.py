@@ -194,7 +194,7 @@ def test_sprung_joints_of_a_free_machine_are_turned_too_far(turn, factor):
         assert frames.suited_factor(model, machine, flight) == factor
         body = model.body(model.joint(joint).bodyid[0]).name
         straight, drawn = frames.at_rest(model, machine), drawing.draw(
-            model, machine, flight, turning=factor
+            model, machine, flight, factor=factor
         )  # fmt: skip
         assert drawn.turned == factor
         between = abs(float(drawn.quaternions[body][0] @ straight.quaternions[body][0]))

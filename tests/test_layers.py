@@ -64,6 +64,7 @@ ONLY_IN = {
         "plots_smooth",
         "plots_table",
         "plots_pair",
+        "plots_panel",
         "plots_certificate",
     },
     "controllers": {"mission", "cli", "cli_tools"},

@@ -5,14 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flown import FREE, ON_AN_AXIS, flown
-from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import FancyArrowPatch
-from written import faults, texts
+from written import faults, summary_of, texts
 
-from spacecraft_sim import plots, plots_chart, plots_film, plots_law, plots_smooth, spans, sphere
-from spacecraft_sim.chart import charts_of, vectors
-from spacecraft_sim.families import families, is_quasi_rigid
+from spacecraft_sim import (
+    plots,
+    plots_chart,
+    plots_film,
+    plots_panel,
+    plots_smooth,
+    spans,
+    sphere,
+)
+from spacecraft_sim.chart import charts_of
+from spacecraft_sim.families import families
 from spacecraft_sim.trajectory import Trajectory
 
 PLANAR = ("duration=60.0",)
@@ -36,26 +43,8 @@ def page(tmp_path_factory):
 
     def draw(flight):
         if id(flight) not in drawn:
-            charts = charts_of(flight.mission.controller)
-            kept, save = [], Figure.savefig
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(
-                    Figure, "savefig", lambda f, *a, **k: (kept.append(f), save(f, *a, **k))
-                )
-                plots.summary(
-                    path,
-                    measured=flight.measured,
-                    predicted=flight.predicted,
-                    drawing=flight.drawing,
-                    verdicts=flight.comparison.verdicts,
-                    title="A flight",
-                    bands=flight.mission.bands,
-                    histories=None
-                    if is_quasi_rigid(flight.predicted)
-                    else plots_smooth.panels(flight.measured, vectors(charts, flight.measured)),
-                    law=plots_law.panels(charts, flight.measured),
-                )
-            drawn[id(flight)] = flight, kept[0], imread(path)  # the flight too: ids are used again
+            figure = summary_of(flight, path)
+            drawn[id(flight)] = flight, figure, imread(path)  # the flight too: ids are used again
         return drawn[id(flight)][1:]
 
     return draw
@@ -193,7 +182,7 @@ def test_a_torque_that_has_faded_is_drawn_as_off(page):
      (0.0, 1.0, "")],
 )  # fmt: skip
 def test_a_prefix_brings_the_peak_above_a_half(peak, scale, letter):
-    assert plots.prefix(peak) == (scale, letter)
+    assert plots_panel.prefix(peak) == (scale, letter)
 
 
 @pytest.mark.parametrize("length", [10, 60, 88, 200])
@@ -212,7 +201,8 @@ def test_a_long_claim_is_written_smaller_before_it_is_cut(length, page):
 def test_a_tumbling_machine_is_drawn_isometrically(page):
     figure, _ = page(flown(*TUMBLING))
     assert any(text.startswith("Isometric") for text in words(figure))
-    assert {"x", "y", "z"} <= set(words(figure))  # the dashes of the axes, in the key
+    named = {f"{axis} {plant}" for axis in "xyz" for plant in ("reduced", "MuJoCo")}
+    assert named <= set(words(figure))  # the colours of the axes, in the key
 
 
 def test_a_machine_without_booms_has_its_rate_instead(page):
@@ -324,20 +314,6 @@ def test_a_craft_that_is_at_rest_is_said_to_be(page):
     signals = {**flight.measured.signals, **still}
     figure, _ = page(replace(flight, measured=replace(flight.measured, signals=signals)))
     assert titles(figure).count("Phase plane z: at rest at 0.7 rad") == 2
-
-
-def test_bands_of_two_axes_have_the_dashes_of_the_axes(tmp_path):
-    flight = flown(*TUMBLING)
-    figure = Figure()
-    bands = {"attitude_x": 0.02, "attitude_y": 0.01, "quasi_rigid_angle_x": 0.03}
-    pair = flight.predicted, flight.measured
-    plots._angle(own := figure.add_subplot(), pair, "attitude", bands, zoom=True)
-    heights = [abs(line.get_ydata()[0]) for line in own.lines if len(set(line.get_ydata())) == 1]
-    scale = 1e-3  # attitudes of 0.1 to 0.2 rad are drawn in mrad
-    assert sorted(heights[-6:]) == pytest.approx(
-        [h / scale for h in (0.01, 0.01, 0.02, 0.02, 0.03, 0.03)]
-    )
-    assert len(own.patches) == 2  # filled: the band of the other angle is none of this one
 
 
 def test_charts_of_a_law_have_their_key_under_the_portrait(tmp_path):

@@ -73,19 +73,6 @@ def test_an_outline_is_what_lies_furthest_out(points):
         assert (kept @ way).max() >= (points @ way).max() - 1e-12
 
 
-def test_exaggeration_is_round_and_leaves_booms_recognisable():
-    straight = np.zeros((1, 2, 3))
-    straight[0, 1, 0] = 10.0
-
-    def factor(off):
-        bent = straight.copy()
-        bent[0, 1, 1] = off
-        return sketch.exaggeration([(bent, straight)])
-
-    assert [factor(x) for x in (3.0, 1.0, 0.5, 0.1, 0.001)] == [1.0, 2.0, 5.0, 20.0, 100.0]
-    assert sketch.exaggeration([]) == 1.0
-
-
 def test_boom_lines_start_at_the_roots_of_the_bus():
     drawing = flown(*PLANAR).drawing
     lines = sketch.boom_lines(drawing)

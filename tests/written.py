@@ -1,4 +1,33 @@
-"""What is written in a figure, and whether it can be read."""
+"""The summary of a flight, what is written in a figure, and whether it can be read."""
+
+import pytest
+from matplotlib.figure import Figure
+
+from spacecraft_sim import plots, plots_law, plots_smooth
+from spacecraft_sim.chart import charts_of, vectors
+from spacecraft_sim.families import is_quasi_rigid
+
+
+def summary_of(flight, path):
+    """Draws the summary of a flight; returns the figure."""
+    charts = charts_of(flight.mission.controller)
+    kept, save = [], Figure.savefig
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", lambda f, *a, **k: (kept.append(f), save(f, *a, **k)))
+        plots.summary(
+            path,
+            measured=flight.measured,
+            predicted=flight.predicted,
+            drawing=flight.drawing,
+            verdicts=flight.comparison.verdicts,
+            title="A flight",
+            bands=flight.mission.bands,
+            histories=None
+            if is_quasi_rigid(flight.predicted)
+            else plots_smooth.panels(flight.measured, vectors(charts, flight.measured)),
+            law=plots_law.panels(charts, flight.measured),
+        )
+    return kept[0]
 
 
 def texts(figure):
