@@ -213,6 +213,17 @@ def charts_of(law: Any) -> Charts:
     return tuple(getattr(law, "charts", ()))
 
 
+def counted(portrait: Portrait, lengths: Array) -> str:
+    """Returns in words how many pulses a channel gave, and the shortest.
+
+    Args:
+        portrait: The chart.
+        lengths: Lengths of the pulses, shape (n,), s.
+    """
+    shortest = f", the shortest {lengths.min():.6g} s" if len(lengths) else ""
+    return f"{len(lengths)} pulses of {portrait.channel}{shortest}"
+
+
 def pulses(time: Array, thrust: Array) -> tuple[Array, Array]:
     """Returns start and length of each completed pulse of one sign, each of shape (n,), s.
 

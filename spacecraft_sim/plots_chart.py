@@ -16,6 +16,7 @@ from spacecraft_sim.chart import (
     Map,
     Portrait,
     Region,
+    counted,
     half_width,
     locked,
     portraits,
@@ -143,8 +144,7 @@ def _pulses(axes: Axes, portrait: Portrait, measured: Trajectory) -> None:
         axes.axhline(portrait.min_on_time, color=INK, linewidth=1.2, label="minimum on-time")
     axes.set_xlim(measured.time[0], measured.time[-1])
     axes.set_ylim(0, 1.35 * max(length.max(initial=0.0), portrait.min_on_time, 1e-9))
-    least = f", the shortest {length.min():.6g} s" if len(length) else ""
-    panel(axes, f"{len(length)} pulses{least}", "time, s", "length, s")
+    panel(axes, counted(portrait, length), "time, s", "length, s")
 
 
 def _map(axes: Axes, chart: Map) -> None:

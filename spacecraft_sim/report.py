@@ -162,8 +162,19 @@ def _flight(figures: report_columns.Figure) -> str:
 
 
 def _charts(figures: report_columns.Figure) -> str:
-    drawn = [_figure(f) for f in figures["figures"] if f["id"].startswith(_MAPS)]
-    return f'<div class="charts">{"".join(drawn)}</div>' if drawn else ""
+    """In two columns; of several portraits each in a column of its own, with what follows it."""
+    drawn = [f for f in figures["figures"] if f["id"].startswith(_MAPS)]
+    portraits = {
+        f["id"].replace("band_", "chart_", 1) for f in drawn if f["id"].startswith("band_")
+    }
+    columns: list[str] = []
+    for figure in drawn:
+        if not columns or figure["id"] in portraits:
+            columns.append("")
+        columns[-1] += _figure(figure)
+    if len(columns) < 2:
+        return f'<div class="charts">{columns[0]}</div>' if columns else ""
+    return f'<div class="charts-by-axis">{"".join(f"<div>{c}</div>" for c in columns)}</div>'
 
 
 def _scenario(mission: Mission, scenario_toml: str) -> str:

@@ -11,6 +11,7 @@ from spacecraft_sim.chart import (
     Map,
     Portrait,
     Sphere,
+    counted,
     floor,
     half_width,
     histories,
@@ -189,9 +190,8 @@ def _pulses(columns: Columns, portrait: Portrait, measured: Trajectory) -> Figur
             data = {"t": columns.add(start[mask], "f8"), "y": columns.add(length[mask])}
             traces.append({**look, **data})
     limit = {"low": least, "high": least, "faint": True, "name": f"minimum on-time {least:g} s"}
-    shortest = f", the shortest {length.min():.6g} s" if len(length) else ""
     figure = {"id": f"pulses_{portrait.name}", "kind": "history", "unit": "s", "floor": 0.0}
-    figure["title"] = f"{len(length)} pulses{shortest}"
+    figure["title"] = counted(portrait, length)
     return {**figure, "traces": traces, "bands": [limit] if least else []}
 
 

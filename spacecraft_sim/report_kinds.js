@@ -131,7 +131,7 @@
     key(shape.caption, "delivered +", "plus", "fill");
     key(shape.caption, "delivered −", "minus", "fill");
     const commanded = element("span", {}, key(shape.caption, "commanded", "ink", "").found);
-    const still = element("span", { class: "key" }, shape.caption);
+    const still = element("span", { class: "key words" }, shape.caption);
     const lanes = spec.channels.map((channel) => {
       const paths = {};
       for (const [name, tone, kind] of [["plus", "plus", "area"], ["minus", "minus", "area"],
@@ -307,7 +307,7 @@
       factor = spec.factors[(spec.factors.indexOf(factor) + 1) % spec.factors.length];
       draw();
     };
-    const instant = element("span", { class: "key" }, shape.caption);
+    const instant = element("span", { class: "key words" }, shape.caption);
     const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     const cross = (a, b) =>
       [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

@@ -1,4 +1,4 @@
-"""What tells axes and bounds apart in the pictures of a run, and one exaggeration in all of them."""
+"""What tells axes and bounds apart in the pictures of a run, and one exaggeration in all."""
 
 from dataclasses import replace
 from pathlib import Path
