@@ -31,7 +31,7 @@ PANEL, LINE = 3.5, 0.165  # heights of a panel with its key, and of a line of th
 TITLE = (17, 14, 11)  # sizes of its letters, points
 ACROSS, STACKS = 4, 3  # panels in a row at most, and parts of the table beside each other
 COLUMNS = (0.64, 0.835, 1.0)  # right edges of those of the table after the first
-LETTERS, INDENT = 47, "   "  # of a line of the first column
+LETTERS, INDENT = 44, "   "  # of a line of the first column
 
 
 def page(
@@ -111,7 +111,9 @@ def _history(
         for k, (name, label) in enumerate(zip(group.signals, group.labels, strict=True)):
             look = {"color": color, "linewidth": width, "linestyle": DASHES[k % len(DASHES)]}
             if label in AXES:
+                smaller = sum(_peak(flight[x]) > _peak(flight[name]) for x in group.signals)
                 look |= {"color": AXES[label][1 - n], "linestyle": "-"}
+                look |= {"zorder": 2 + 0.5 * n + 0.1 * smaller}  # over the larger ones
             axes.plot(flight.time, flight[name] / scale, label=f"{run}: {label}", **look)
         for half in band.values():
             axes.axhspan(-half / scale, half / scale, color=GOOD, alpha=0.08, linewidth=0)

@@ -61,7 +61,7 @@ def page(
         figures.insert(3, _lanes(columns, channels, measured))
     figures.append(_craft(columns, drawing))
     moving = moving_axes(measured, "quasi_rigid_rate")
-    axes = [a for a in moving_axes(measured, "quasi_rigid_angle") if a in moving]
+    axes = [a for a in sorted(moving_axes(measured, "quasi_rigid_angle")) if a in moving]
     figures += [f for axis in axes for f in _phase_plane(columns, axis, flights, bands)]
     figures += [f for chart in charts for f in report_charts.figures(columns, chart, flights)]
     start, end = float(measured.time[0]), float(measured.time[-1])
@@ -230,8 +230,7 @@ def _phase_plane(
     y = {"name": f"quasi-rigid rate {axis}", "unit": "rad/s"}
     half = bands.get(names[0])
     band = [{"low": -half, "high": half, "name": f"±{half:.3g} rad"}] if half else []
-    title = f"Phase plane {axis}" if axis != "z" else "Phase plane"
-    figure = plane(f"phase_{axis}", f"{title}, of the time shown", x, y)
+    figure = plane(f"phase_{axis}", f"Phase plane {axis}, of the time shown", x, y)
     return [
         {
             **figure,

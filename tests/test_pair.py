@@ -9,7 +9,8 @@ import rrd
 from matplotlib.figure import Figure
 from written import faults, texts
 
-from spacecraft_sim import cli, pair_folder, plots_pair, run_pair
+from spacecraft_sim import cli, pair_folder, plots_pair, run_pair, signal_groups
+from spacecraft_sim.plots_panel import AXES
 from spacecraft_sim.trajectory import Trajectory, channel_units
 
 NAME = "efremov-nonlocal"
@@ -237,6 +238,18 @@ def test_the_last_cycles_are_few():
         x, y = line.get_data()
         turns = np.ptp(np.unwrap(np.arctan2(y, x))) / (2 * np.pi)
         assert 1 <= turns <= plots_pair.CYCLES + 1  # the last one may have just begun
+
+
+def test_axes_have_colours_and_smaller_swings_lie_over_larger_ones():
+    time = np.linspace(0, 10, 101)
+    sizes = {"rate_x": 1, "rate_y": 3, "rate_z": 2}
+    signals = {name: size * np.sin(time) for name, size in sizes.items()}
+    flight = Trajectory(time=time, signals=signals, units=dict.fromkeys(signals, "rad/s"))
+    (group,) = signal_groups.groups((flight, flight), ())
+    axes = Figure().add_subplot()
+    plots_pair._history(axes, flights=(("A", flight), ("B", flight)), group=group)
+    drawn = [line.get_color() for line in sorted(axes.lines, key=lambda line: line.get_zorder())]
+    assert drawn == [AXES[axis][k] for k in (1, 0) for axis in "yzx"]
 
 
 @pytest.mark.parametrize(("a", "b"), [("one", "one"), ("one", "arm"), ("one", "local")])

@@ -27,6 +27,12 @@ def test_pulses_name_their_channel():
         assert f" pulses of thruster_{axis}" in title
 
 
+def test_phase_planes_name_their_axes_in_turn():
+    found, _ = figures(flight())
+    titles = [figure["title"] for name, figure in found.items() if name.startswith("phase_")]
+    assert titles == [f"Phase plane {axis}, of the time shown" for axis in "xyz"]
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason=MISSING)
 @pytest.mark.parametrize(("width", "columns"), [(1400, 3), (1000, 2), (420, 1)])
 def test_each_axis_has_its_charts_below_each_other_and_captions_are_whole(width, columns, tmp_path):
