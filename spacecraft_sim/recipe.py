@@ -11,6 +11,7 @@ from typing import IO, Any
 import numpy as np
 
 Call = tuple[tuple, dict[str, Any]]
+END = b"\n"  # of all recipes, if it can be told
 
 
 class Recipe:
@@ -59,11 +60,11 @@ def made(file: IO[bytes], names: Mapping[str, Any]) -> Any:
         names: What has a name.
 
     Raises:
-        EOFError: If there is no further recipe, or only a part of one.
+        EOFError: If there is no further recipe, only a part of one, or the end.
         AttributeError: If a name is not there.
     """
     line = file.readline()
-    if not line.endswith(b"\n"):
+    if line == END or not line.endswith(b"\n"):
         raise EOFError("no further recipe")
     return _object(json.loads(line), file, names)
 

@@ -12,7 +12,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from spacecraft_sim import child_process
-from spacecraft_sim.recipe import Recipe
+from spacecraft_sim.recipe import END, Recipe
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -110,6 +110,7 @@ class Outlet:
                     pipe.write(recipes[k : k + BLOCK])
                     pipe.flush()
                     self._taken += 1
+            pipe.write(END)  # a fork of this process may keep the pipe open
 
 
 class Stream:

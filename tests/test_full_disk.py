@@ -164,6 +164,16 @@ def test_a_process_that_dies_is_told_and_the_flight_goes_on(short, started, tmp_
     assert "the process that writes it ended with -9" in (recording.lost_file or "")
 
 
+def test_a_pipe_that_a_fork_keeps_open_holds_up_no_end(short, started, tmp_path, monkeypatch):
+    monkeypatch.setattr(record_stream, "CLOSING", 5.0)
+    subject, _, below = short
+    with record.Recording(subject, tmp_path / "recording.rrd") as recording:
+        kept = os.dup(started[0].stdin.fileno())
+        recording.expect(below)
+    os.close(kept)
+    assert recording.lost_file is None
+
+
 @pytest.mark.parametrize("left", [None, b"", b"RRF2 and nothing else"])
 def test_a_file_that_is_taken_away_is_told(left, short, started, tmp_path):
     subject, measured, below = short

@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 
-from spacecraft_sim.recipe import Recipe, made
+from spacecraft_sim.recipe import END, Recipe, made
 
 
 class Library:
@@ -85,9 +85,10 @@ def test_attributes_calls_and_recipes_within_recipes():
     np.testing.assert_array_equal(lengths, [2, 3])
 
 
-def test_recipes_follow_each_other_until_there_is_none():
+@pytest.mark.parametrize("rest", [b"", END, END + b"what was not meant"])
+def test_recipes_follow_each_other_until_there_is_none(rest):
     data = b"".join(Recipe("lib").Thing(np.full(5, k)).encoded() for k in range(3))
-    file = io.BytesIO(data)
+    file = io.BytesIO(data + rest)
     for k in range(3):
         np.testing.assert_array_equal(made(file, {"lib": Library}).words[0], np.full(5, k))
     with pytest.raises(EOFError, match="no further recipe"):
