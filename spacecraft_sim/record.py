@@ -113,6 +113,8 @@ class Recording:
         # A viewer has one layout for all recordings of an application: each is one of its own.
         own = f"{APPLICATION} {name[:8]}"
         self._file = Outlet(own, name, rr.FileSink(str(self._path))) if path else None
+        if self._file and self._path:
+            self._file.hold(self._path)
         self._viewer = Outlet(own, name, rr.GrpcSink(viewer)) if viewer else None
         self._stream = stream = Stream([o for o in (self._file, self._viewer) if o])
         stream.send_recording_name(subject.title)

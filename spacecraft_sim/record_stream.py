@@ -7,6 +7,7 @@ is stuck or gone does not hold up the run, and one whose run was killed closes i
 import contextlib
 import subprocess
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from queue import SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -56,6 +57,14 @@ class Outlet:
             recipes: Encoded recipes, one after the other.
         """
         self._queue.put(recipes)
+
+    def hold(self, path: Path) -> None:
+        """Locks a file until the process ends.
+
+        Args:
+            path: The file, absolute.
+        """
+        self.pass_on(Recipe("hold")(str(path)).encoded())
 
     def lay_out(self, blueprint: rrb.Blueprint) -> None:
         """Sends the layout of the views.

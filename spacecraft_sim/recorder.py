@@ -24,7 +24,7 @@ def main() -> int:
     from spacecraft_sim.recipe import made
 
     rr.set_strict_mode(True)  # a mistake is an error, not a remark
-    told, names = sys.stdin.buffer, {"rr": rr, "rrb": rrb}
+    told, names = sys.stdin.buffer, {"rr": rr, "rrb": rrb, "hold": _hold}
     stream = names["stream"] = made(told, names)
     try:
         while True:
@@ -33,6 +33,14 @@ def main() -> int:
         return _close(stream)
     except RuntimeError as error:  # a flush: the disk is full, the viewer gone
         return _give_up(str(error))
+
+
+def _hold(path: str) -> None:
+    """Locks a file as long as this process lives: whoever would replace it can tell."""
+    with contextlib.suppress(ImportError, OSError):  # there are systems without such locks
+        import fcntl
+
+        fcntl.flock(os.open(path, os.O_RDONLY), fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _close(stream: Any) -> int:

@@ -5,6 +5,7 @@ import subprocess
 import tempfile
 import warnings
 from pathlib import Path
+from typing import IO
 
 from rerun.chunk import RrdReader
 
@@ -24,16 +25,18 @@ def repair(path: Path) -> bool:
         Whether anything was wrong; if not, the file is left as it was.
 
     Raises:
-        ValueError: If it is no recording, nothing of it can be read, or the repaired one has no
-            room beside it.
+        ValueError: If it is no recording, is still being written, nothing of it can be read, or
+            the repaired one has no room beside it.
     """
     try:
         with path.open("rb") as file:
-            start = file.read(len(_MAGIC))
+            start, held = file.read(len(_MAGIC)), _is_held(file)
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from error
     if start != _MAGIC:
         raise ValueError(f"{path}: not a recording; an .rrd file begins with {_MAGIC.decode()!r}")
+    if held:
+        raise ValueError(f"{path}: still being written; wait until its run is over")
     if _rerun("verify", str(path)) is None and _holds_something(path):
         return False
     size, free = path.stat().st_size, shutil.disk_usage(path.parent).free
@@ -62,6 +65,17 @@ def end(path: Path) -> float:
             nanoseconds = batch.column(TIMELINE).cast("int64").to_numpy()
             last = max(last, int(nanoseconds.max(initial=0)))
     return last / 1e9
+
+
+def _is_held(file: IO[bytes]) -> bool:
+    """Whether the process that writes a file lives: what it writes yet would be lost."""
+    try:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except (ImportError, OSError) as error:  # or there are no such locks
+        return isinstance(error, BlockingIOError)
+    return False
 
 
 def _replace(path: Path) -> None:

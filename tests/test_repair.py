@@ -3,6 +3,7 @@
 `repair` makes that whole.
 """
 
+import contextlib
 import os
 import shutil
 import signal
@@ -43,8 +44,10 @@ def started(out, size):
 def killed(out, size):
     """The recording of a long run that was killed with all that it started, as by a power cut."""
     run, path = started(out, size)
+    recorders = psutil.Process(run.pid).children()
     os.killpg(run.pid, signal.SIGKILL)
     run.wait()
+    psutil.wait_procs(recorders, 60)
     return path
 
 
@@ -170,6 +173,26 @@ def test_without_room_for_the_repaired_file_the_broken_one_is_left(broken, tmp_p
     with pytest.raises(ValueError, match=r"takes 1\.\d MB; 1\.\d MB are free: make room"):
         repair(path)
     assert path.read_bytes() == broken.read_bytes()
+
+
+def test_a_recording_that_is_still_written_is_left_alone(tmp_path):
+    run, path = started(tmp_path / "run", 200_000)
+    try:
+        with pytest.raises(ValueError, match=r"recording\.rrd: still being written"):
+            repair(path)
+        (recorder,) = psutil.Process(run.pid).children()
+        recorder.suspend()
+        run.kill()
+        run.wait()
+        with pytest.raises(ValueError, match=r"recording\.rrd: still being written"):
+            repair(path)
+        recorder.resume()
+        psutil.wait_procs([recorder], 60)
+        assert not repair(path)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(run.pid, signal.SIGKILL)
+        run.wait()
 
 
 def test_a_repair_that_is_killed_is_told(broken, tmp_path, monkeypatch):
