@@ -41,7 +41,7 @@ def _balance(model: ReducedModel, axis: str) -> Guarantee:
 
     return Guarantee(
         claim=f"angular momentum about {axis} is the impulse given",
-        source="Efremov et al. 2006, (1.6): H' = u + f; if not: a shorter simulation.timestep",
+        source="Efremov et al. 2006, (1.6): H' = u + f",
         unit="N m s",
         measure=measure,
         predicted=0.0,

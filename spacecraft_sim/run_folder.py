@@ -101,7 +101,7 @@ def fly(
             recording.conclude(comparison.verdicts)
             # While the recording is written to its end.
             write_verdicts(folder, mission, comparison)
-            write_pictures(folder, mission, measured, predicted, comparison)
+            write_pictures(folder, mission, measured, predicted, comparison, exaggeration)
     return Run(
         measured=measured,
         predicted=predicted,
@@ -219,6 +219,7 @@ def write_pictures(
     measured: Trajectory,
     predicted: Trajectory,
     comparison: Comparison,
+    exaggeration: float | None = None,
 ) -> None:
     """Writes `summary.png`, `report.html` and, for a law that has maps, `charts.png`.
 
@@ -228,12 +229,13 @@ def write_pictures(
         measured: Flight of the MuJoCo plant.
         predicted: Flight of the reduced plant.
         comparison: How it came out.
+        exaggeration: As for `fly`.
     """
     from spacecraft_sim import drawing, frames, plots, plots_chart, plots_law, plots_smooth, report
 
     title, charts = mission.scenario.title, charts_of(mission.controller)
     model, machine = mission.mujoco.model.ptr, mission.machine
-    factor = frames.suited_factor(model, machine, predicted)
+    factor = exaggeration or frames.suited_factor(model, machine, predicted)
     drawn = drawing.draw(model, machine, measured, factor=factor)
     plots.summary(
         folder / "summary.png",
