@@ -61,7 +61,7 @@ def made(file: IO[bytes], names: Mapping[str, Any]) -> Any:
 
     Raises:
         EOFError: If there is no further recipe, only a part of one, or the end.
-        AttributeError: If a name is not there.
+        AttributeError, KeyError: If a name is not there.
     """
     line = file.readline()
     if line == END or not line.endswith(b"\n"):

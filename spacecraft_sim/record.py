@@ -47,7 +47,8 @@ Nozzles = dict[str, list[record_scene.Nozzle]]
 LOOKS = 60  # instants of a flight at which it is looked how far an arm reaches
 _FOOTER = b"RRF2FOOT"  # and four bytes more end a file that is whole
 ROOM = 1_000_000  # bytes that a disk must have for a recording to begin
-UNFINISHED = "cannot be written to its end; is the disk full? 'repair' keeps the rest"
+UNFINISHED = "cannot be written to its end"
+REST = "is the disk full? 'repair' keeps what is there"
 PLUME = 0.25  # longest plume, in sizes of the spacecraft
 
 
@@ -137,7 +138,7 @@ class Recording:
             self.lost_viewer = f"the viewer was lost: {reason}"
         if self._file and self._path:
             reason = self._file.close() or _unfinished(self._path)
-            self.lost_file = f"{self._path}: {UNFINISHED} ({reason})" if reason else None
+            self.lost_file = f"{self._path}: {UNFINISHED}: {reason}; {REST}" if reason else None
 
     def expect(self, beneath: Beneath) -> None:
         """Takes the flight that is known beforehand, and lays out the views.

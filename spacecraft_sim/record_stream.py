@@ -42,7 +42,9 @@ class Outlet:
             identity: Name of the recording, of which there is no other.
             sink: The place.
         """
-        self.process = child_process.start("recorder", stdin=subprocess.PIPE)
+        self.process = child_process.start(
+            "recorder", stdin=subprocess.PIPE, environment={"RERUN": "on"}
+        )
         self._queue: SimpleQueue[bytes | None] = SimpleQueue()
         self._taken = 0  # blocks that the process has taken
         self._passing = Thread(target=self._pass_on, daemon=True)

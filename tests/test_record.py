@@ -237,6 +237,11 @@ def test_two_recordings_in_one_viewer_keep_their_layouts(short, tmp_path):
     assert one.startswith("spacecraft_sim ")
 
 
+def test_a_user_who_has_switched_rerun_off_gets_a_recording(short, tmp_path, monkeypatch):
+    monkeypatch.setenv("RERUN", "off")
+    assert "/attitude/simulated" in written(tmp_path / "r.rrd", short, [1000])
+
+
 def test_the_flight_goes_out_while_it_is_flown(short, monkeypatch):
     ready, measured, _ = short
     monkeypatch.setattr(simulate, "CHUNK", 20)
