@@ -150,11 +150,13 @@ def _angle(axes: Axes, flights: Flights, kind: str, bands: Mapping[str, float], 
     for k, (name, half) in enumerate(own.items()):
         axes.axhspan(-half / scale, half / scale, color=GOOD, alpha=0.10, linewidth=0)
         words = f"{name[-1]} ±{half / scale:.3g}", 0.995 - STAGGER[0] * k, "right"
-        _bound(axes, half / scale, words, AXES[name[-1]][0] if len(own) > 1 else GOOD, "-")
-    words = {"quasi_rigid_angle": "quasi-rigid", "attitude": "of the bus"}
+        _bound(axes, half / scale, words, _bound_color(name, own), "-")
     for k, (name, half) in enumerate(others.items() if zoom else ()):
-        label = f"{name[-1]} {words[name[:-2]]}", 0.005 + STAGGER[1] * k, "left"
-        _bound(axes, half / scale, label, AXES[name[-1]][0] if len(others) > 1 else GOOD, ":")
+        kept = (
+            name[:-2].replace("quasi_rigid_angle", "quasi-rigid").replace("attitude", "of the bus")
+        )
+        label = f"{name[-1]} {kept.replace('_', ' ')}", 0.005 + STAGGER[1] * k, "left"
+        _bound(axes, half / scale, label, _bound_color(name, others), ":")
     low, high = axes.get_ylim()
     outermost = 1.2 * max(shown, default=0.0) / scale  # with room for its name
     axes.set_ylim(min(low, -outermost), max(high, outermost))
@@ -168,6 +170,11 @@ def _angle(axes: Axes, flights: Flights, kind: str, bands: Mapping[str, float], 
         unit += " (log beyond the peak)"
     titles = {"quasi_rigid_angle": "Quasi-rigid angle", "attitude": "Attitude of the bus"}
     panel(axes, f"{titles[kind]}, {unit}")
+
+
+def _bound_color(name: str, drawn: Mapping[str, float]) -> str:
+    """That of the axis where bounds of several are drawn."""
+    return AXES[name[-1]][0] if len(drawn) > 1 and name[-1] in AXES else GOOD
 
 
 def _bound(axes: Axes, half: float, label: tuple[str, float, str], color: str, dashes: str) -> None:

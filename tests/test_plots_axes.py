@@ -45,6 +45,19 @@ def test_bands_of_two_axes_have_the_colours_and_the_names_of_the_axes():
     assert len(own.patches) == 2  # filled: the band of the other angle is none of this one
 
 
+@pytest.mark.parametrize(
+    ("signal", "words"),
+    [("estimated_quasi_rigid_angle_x", "x estimated quasi-rigid"), ("attitude_y", "y of the bus"),
+     ("elbow_angle_1", "1 elbow angle")],
+)  # fmt: skip
+def test_a_bound_of_any_other_signal_has_its_name(signal, words):
+    flight = flown(*TUMBLING)
+    axes = Figure().add_subplot()
+    pair = flight.predicted, flight.measured
+    plots._angle(axes, pair, "quasi_rigid_angle", {signal: 0.02, "elbow_2": 0.01}, zoom=True)
+    assert words in [text.get_text() for text in axes.texts]
+
+
 def test_axes_are_told_apart_by_colours_that_are_those_of_the_report(tmp_path):
     figure = summary_of(flown(*TUMBLING), tmp_path / "summary.png")
     css = (Path(report.__file__).parent / "report.css").read_text()
