@@ -80,3 +80,13 @@ def test_an_action_of_another_length_is_refused():
     environment.reset()
     with pytest.raises(ValueError, match=r"2 entries.*thruster_z"):
         environment.step(np.zeros(2))
+
+
+def test_a_disturbance_that_the_relay_cannot_overcome_leaves_no_limit_cycle_to_judge():
+    found = verdicts("disturbance.z.amplitude=50.0", "duration=150.0")
+    for name in ("period", "|v/J|", "|beta/J|"):
+        verdict = found[f"limit cycle: {name}"]
+        assert not verdict.holds
+        assert any("the relay overcomes the disturbance" in a.text for a in verdict.failed)
+    calm = verdicts("disturbance.z.amplitude=0.001", "duration=150.0")["limit cycle: period"]
+    assert any("overcomes" in a.text and a.holds for a in calm.assumptions)

@@ -6,7 +6,7 @@ import pytest
 import rrd
 from rich.console import Console
 
-from spacecraft_sim import cli, mission, run_folder
+from spacecraft_sim import cli, mission, plots, record_chart, report, run_folder
 from spacecraft_sim.trajectory import Trajectory
 
 LEFT = {"recording.rrd", "reduced.parquet", "report.html", "scenario.toml", "summary.png",
@@ -69,3 +69,29 @@ def test_a_narrow_terminal_loses_no_digit(width):
     texts = {str(a) for verdict in comparison.verdicts for a in verdict.failed}
     assert sorted(line.split(": ", 1)[1].rpartition(" (")[0] for line in failed) == sorted(texts)
     assert any("until the pulses have acted" in line and "(1 claim)" in line for line in failed)
+
+
+@pytest.mark.parametrize("exaggeration", [None, 7.0])
+def test_the_pictures_bend_as_far_as_is_asked(exaggeration, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(plots, "summary", lambda *_, drawing, **__: drawn.append(drawing))
+    monkeypatch.setattr(report, "write", lambda *_, drawing, **__: drawn.append(drawing))
+    ready = mission.assemble(mission.load_scenario("efremov-nonlocal", ("duration=2.0",)))
+    run_folder.fly(tmp_path, ready, exaggeration=exaggeration)
+    found = {drawing.bending for drawing in drawn}
+    assert len(drawn) == 2
+    assert (found == {7.0}) == (exaggeration == 7.0)
+    assert len(found) == 1
+
+
+def test_planes_of_several_axes_name_theirs():
+    ready = mission.assemble(mission.load_scenario("sokolov-attitude", ("duration=20.0",)))
+    flight = ready.fly("reduced")
+    drawn = record_chart.planes(ready.controller.charts, [flight], ready.bands)
+    views = record_chart.plane_views(drawn, {"simulated": 20.0}, following=False)
+    told = b"".join(view.encoded() for view in views)
+    for axis in "xyz":
+        assert f"Phase plane {axis}, whole flight".encode() in told
+    one = [plane for plane in drawn if plane.portrait.signals[0].endswith("_x")]
+    alone = record_chart.plane_views(one, {"simulated": 20.0}, following=False)
+    assert b"Phase plane, whole flight" in b"".join(view.encoded() for view in alone)
